@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,8 +17,21 @@ import numpy.typing as npt
 from doe.analysis.canonical import Canonical, RidgePath, canonical_analysis, ridge_analysis
 from doe.analysis.contrasts import Contrasts, Curvature, curvature, is_regular, regular_contrasts, screening_contrasts
 from doe.analysis.few_terms import FewTermsModel, few_terms
+from doe.analysis.mixture import MixtureFit
 from doe.analysis.model_adequacy import BoxCox, Diagnostics, box_cox, diagnose_fit
-from doe.analysis.models import Order, OrderFit, bearable, fit_summary, hierarchical, highest_order, terms_of
+from doe.analysis.models import (
+    STAYS,
+    Order,
+    OrderFit,
+    ReducedModel,
+    Reduction,
+    bearable,
+    fit_summary,
+    hierarchical,
+    highest_order,
+    reduced_model,
+    terms_of,
+)
 from doe.analysis.optimum import Optimum, find_optimum
 from doe.analysis.replicates import row_moments
 from doe.analysis.screening import Screening, analyse_screening
@@ -61,9 +75,21 @@ class Effects(Record):
 
 
 @dataclass(frozen=True)
+class TargetIntervals(Record):
+    """Half widths about the model at the setting for a target, unit of the response: of one further run (95 %), and of
+    95 % of all further runs with a confidence of 95 %.
+    """
+
+    one_run: float
+    most_runs: float
+
+
+@dataclass(frozen=True)
 class DesignAnalysis(Record):
     """What the runs of a design say. effects: None unless every level is low, high or (all factors) middle. model: None
-    where the runs leave no error for any model. notes: sentences that a reader must know.
+    where the runs leave no error for any model. notes: sentences that a reader must know. mixture: of parts that add up
+    to a whole, instead of all others. at_target: None without an optimum. reduced: None without a search for terms to
+    drop.
     """
 
     fits: tuple[OrderFit, ...]
@@ -71,6 +97,14 @@ class DesignAnalysis(Record):
     model: FittedModel | None
     optimum: Optimum | None
     notes: tuple[str, ...]
+    mixture: MixtureFit | None = None
+    at_target: TargetIntervals | None = None
+    reduced: ReducedModel | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return every field; those that not every analysis has only where it has them."""
+        own = {name for name in ("mixture", "at_target", "reduced") if getattr(self, name) is None}
+        return {name: value for name, value in super().to_dict().items() if name not in own}
 
 
 @dataclass(frozen=True)
@@ -90,6 +124,7 @@ def analyse_design(
     terms: Sequence[str] = (),
     target: ResponseTarget | None = None,
     blocks: Blocks | None = None,
+    reduction: Reduction | None = None,
 ) -> DesignAnalysis:
     """Analyse one response.
 
@@ -97,11 +132,17 @@ def analyse_design(
     order: "linear", "interactions" or "quadratic"; None for the highest that the runs bear with 3 degrees of freedom
     for the error. terms: instead of an order, the terms of the model; what they stand on is added. blocks: in which the
     runs were made; they have fixed effects in the model, and the effects of a two-level design are told by that alone.
+    reduction: rule by which terms are dropped from this model.
     Raises StatisticsError where nothing can be estimated, or an order or term is asked for that the runs cannot bear.
     """
     notes: list[str] = []
     effects = None if blocks is not None else _effects(coded, responses, region.names, notes)
     chosen = _terms(coded, responses, region.names, order, terms, effects is not None, blocks)
+    reduced = None
+    if reduction is not None and chosen is not None:
+        reduced = reduced_model(coded, responses, region, chosen, reduction, blocks)
+        chosen = reduced.terms
+        notes.append(_reduced(reduced))
     model = None if chosen is None else _model(fit_surface(coded, responses, region, chosen, blocks), region.names)
     if model is None:
         notes.append("The runs leave no error for a model: effects stand beside Lenth's margin only.")
@@ -122,7 +163,24 @@ def analyse_design(
             )
             notes += _extrapolation(optimum, model.surface)
     fits = () if chosen is None else fit_summary(coded, responses, region, blocks)
-    return DesignAnalysis(fits, effects, model, optimum, tuple(notes))
+    at_target = None
+    if optimum is not None and model is not None:
+        at = optimum.point_coded
+        at_target = TargetIntervals(
+            float(model.surface.prediction_half_width(at)), float(model.surface.tolerance_half_width(at))
+        )
+    return DesignAnalysis(fits, effects, model, optimum, tuple(notes), at_target=at_target, reduced=reduced)
+
+
+def _reduced(found: ReducedModel) -> str:
+    """A sentence: what was dropped, and what that does to the tests of what is left."""
+    rule = "AICc" if found.rule == "aicc" else f"p > {STAYS:g}"
+    if not found.dropped:
+        return f"Reduction by {rule} drops no term."
+    return (
+        f"Reduced by {rule}, one term after the other: {', '.join(found.dropped)}. The p values and intervals of "
+        "what is left take no account of this search and are too small."
+    )
 
 
 def _terms(

@@ -17,7 +17,7 @@ from scipy import stats
 
 from doe.analysis.few_terms import partial_aliases
 from doe.analysis.replicates import row_moments
-from doe.designs.plackett_burman import plackett_burman
+from doe.designs.plackett_burman import tables
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
@@ -137,10 +137,9 @@ def _unused_columns(levels: IntArray) -> IntArray:
         size = rows // 2 if folded else rows
         if size % 4 or not 8 <= size <= 48 or k > size - 1:
             continue
-        table = plackett_burman(size)
-        if folded:
-            table = np.vstack([table, -table])
-        taken = [j for column in levels.T for j in range(size - 1) if np.array_equal(table[:, j], column)]
-        if len(taken) == k:
-            return np.delete(table, taken, axis=1)
+        for table in tables(size):
+            whole = np.vstack([table, -table]) if folded else table
+            taken = [j for column in levels.T for j in range(size - 1) if np.array_equal(whole[:, j], column)]
+            if len(taken) == k:
+                return np.delete(whole, taken, axis=1)
     return np.zeros((rows, 0), dtype=np.int64)

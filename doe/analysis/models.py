@@ -20,6 +20,7 @@ from doe.analysis.replicates import require_matrix
 from doe.analysis.steepest_ascent import Region
 from doe.analysis.surface import (
     Blocks,
+    Surface,
     block_columns,
     fit_surface,
     included_terms,
@@ -33,6 +34,9 @@ from doe.record import Record
 FloatArray = npt.NDArray[np.float64]
 Order = Literal["linear", "interactions", "quadratic"]
 ORDERS: tuple[Order, ...] = get_args(Order)
+Reduction = Literal["aicc", "p"]
+STAYS = 0.05
+"""A term with a larger p is dropped, by the rule p."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,73 @@ def hierarchical(names: Sequence[str], terms: Sequence[str]) -> tuple[str, ...]:
     included = included_terms(names, sorted(wanted))
     every = ("intercept", *terms_of(names, "quadratic"))
     return tuple(term for term, is_in in zip(every, included, strict=True) if is_in and term != "intercept")
+
+
+@dataclass(frozen=True)
+class ReducedModel(Record):
+    """Terms that a backward elimination left, and those that it dropped, in turn. criterion: AICc of the model that is
+    left, NaN by the rule p.
+    """
+
+    rule: Reduction
+    terms: tuple[str, ...]
+    dropped: tuple[str, ...]
+    criterion: float
+
+
+def reduced_model(
+    coded: FloatArray,
+    responses: FloatArray,
+    region: Region,
+    terms: Sequence[str],
+    rule: Reduction,
+    blocks: Blocks | None = None,
+) -> ReducedModel:
+    """Drop one term after the other; a factor stays while a product or square of it is in the model.
+
+    By "aicc" the term without which AICc = n ln(SSE/n) + 2 q + 2 q (q + 1)/(n - q - 1) is least, as long as it falls; q
+    counts the coefficients, the blocks' and sigma (Hurvich and Tsai 1989, Biometrika 76:297). By "p" the term of the
+    largest p, as long as that is above 0.05. Raises StatisticsError where the runs do not bear `terms`.
+    """
+    left, dropped = list(terms), []
+    fitted = fit_surface(coded, responses, region, left, blocks)
+    while len(left) > 1:
+        free = [term for term in left if not any(term != other and term in _parts(other) for other in left)]
+        without = {
+            term: fit_surface(coded, responses, region, [one for one in left if one != term], blocks) for term in free
+        }
+        if rule == "aicc":
+            chosen = min(free, key=lambda term: corrected_aic(without[term]))
+            if not corrected_aic(without[chosen]) < corrected_aic(fitted):
+                break
+        else:
+            p = {term: _added((_residual(without[term])), _residual(fitted))[1] for term in free}
+            chosen = max(free, key=lambda term: p[term])
+            if not p[chosen] > STAYS:
+                break
+        left.remove(chosen)
+        dropped.append(chosen)
+        fitted = without[chosen]
+    return ReducedModel(rule, tuple(left), tuple(dropped), corrected_aic(fitted) if rule == "aicc" else math.nan)
+
+
+def corrected_aic(surface: Surface) -> float:
+    """Return AICc of a fitted surface; infinite where there are too few runs for its correction."""
+    n = surface.observed.size
+    q = n - surface.df_residual + 1
+    if n - q - 1 < 1:
+        return math.inf
+    squares = max(surface.mse * surface.df_residual, np.finfo(np.float64).tiny)
+    return n * math.log(squares / n) + 2 * q + 2 * q * (q + 1) / (n - q - 1)
+
+
+def _parts(term: str) -> tuple[str, ...]:
+    """The linear terms that a product or a square stands on; none of a linear one."""
+    return tuple(term.removesuffix("^2").split("*")) if term.endswith("^2") or "*" in term else ()
+
+
+def _residual(surface: Surface) -> tuple[float, int]:
+    return surface.mse * surface.df_residual, surface.df_residual
 
 
 def fit_summary(

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import optimize
 
-from doe.analysis.surface import included_terms, second_order_terms, term_names, with_intercept
+from doe.analysis.surface import block_columns, included_terms, second_order_terms, term_names, with_intercept
 from doe.errors import StatisticsError
 from doe.record import Record
 
@@ -53,10 +53,12 @@ def precision(
     sigma: float,
     effect: float = math.nan,
     alpha: float = 0.05,
+    block: npt.NDArray[np.int64] | None = None,
 ) -> tuple[TermPrecision, ...]:
     """Return what runs at `coded`, shape (runs, factors), tell about each kind of the model's terms.
 
     terms: as of `doe.analysis.surface.term_names`. sigma: standard deviation of one run, unit of the response.
+    block: in which each run is made, (runs,), from 0; None or empty where there are no blocks.
     Raises StatisticsError for a sigma or an effect that is not positive, or terms that the runs cannot separate.
     """
     for name, value in (("sigma", sigma), ("effect", effect)):
@@ -64,11 +66,14 @@ def precision(
             raise StatisticsError(f"{name} = {value:g} must be a positive number")
     included = included_terms(names, terms)
     model = second_order_terms(coded)[:, included]
+    if block is not None and block.size:
+        model = np.column_stack([model, block_columns(block, int(block.max()) + 1)])
     if np.linalg.matrix_rank(model) < model.shape[1]:
         raise StatisticsError(f"the {len(coded)} runs cannot separate the {model.shape[1]} terms of the model")
     errors = sigma * np.sqrt(np.diag(np.linalg.inv(model.T @ model)))
     df = model.shape[0] - model.shape[1]
     kinds = [_kind(term) for term, is_in in zip(term_names(names), included, strict=True) if is_in]
+    errors = errors[: len(kinds)]
     found = []
     for kind in ("factor", "interaction", "square"):
         of_kind = [error for error, own in zip(errors, kinds, strict=True) if own == kind]

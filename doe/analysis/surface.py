@@ -87,6 +87,21 @@ class Surface(Record):
         """Return half the interval for the mean response at coded points, (..., k) -> (...)."""
         return np.asarray(stats.t.ppf((1 + level) / 2, self.df_residual) * self.standard_error(coded))
 
+    def prediction_half_width(self, coded: npt.ArrayLike, level: float = 0.95) -> FloatArray:
+        """Return half the interval for one further run at coded points, (..., k) -> (...): t s sqrt(1 + h)."""
+        error = np.sqrt(self.mse + self.standard_error(coded) ** 2)
+        return np.asarray(stats.t.ppf((1 + level) / 2, self.df_residual) * error)
+
+    def tolerance_half_width(self, coded: npt.ArrayLike, share: float = 0.95, level: float = 0.95) -> FloatArray:
+        """Return half the interval that holds a `share` of all further runs at coded points, with confidence `level`.
+
+        z s sqrt((1 + h) df/chi2), chi2 the quantile 1 - level of df degrees of freedom, h the leverage of the point,
+        whose inverse stands for the number of runs (Howe 1969, J. Am. Stat. Assoc. 64:610; Wallis 1951).
+        """
+        error = np.sqrt(self.mse + self.standard_error(coded) ** 2)
+        spread = np.sqrt(self.df_residual / stats.chi2.ppf(1 - level, self.df_residual))
+        return np.asarray(stats.norm.ppf((1 + share) / 2) * spread * error)
+
     def confidence_interval(self, coded: npt.ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
         """Return low and high of the interval for the mean response at coded points."""
         half = self.half_width(coded, level)

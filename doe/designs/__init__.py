@@ -7,6 +7,8 @@ from doe.designs.central_composite import CentralComposite, central_composite
 from doe.designs.definitive_screening import DefinitiveScreening, definitive_screening
 from doe.designs.design import ALPHAS, ChosenDesign, Design, DesignOptions, Points, factor_letters
 from doe.designs.factorial import Factorial, factorial
+from doe.designs.mixture import Mixture
+from doe.designs.optimal import DOptimal, IOptimal
 from doe.designs.plackett_burman import PlackettBurman, fold_over, interaction_aliases, plackett_burman
 from doe.designs.space_filling import LatinHypercube, Sobol, latin_hypercube, sobol
 from solver import Registry, instance_of
@@ -19,6 +21,9 @@ DESIGNS: Registry[Design] = Registry(
         BoxBehnken(),
         CentralComposite(),
         Factorial(),
+        DOptimal(),
+        IOptimal(),
+        Mixture(),
         LatinHypercube(),
         Sobol(),
     ),

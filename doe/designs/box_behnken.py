@@ -4,6 +4,11 @@ Source: Box and Behnken 1960, Technometrics 2:455. For 3, 4 and 5 factors the de
 every pair of factors with the others at zero, plus centre runs. For 6 and 7 factors it is the 2 x 2 x 2 factorial
 on the published triples: for 7 the balanced blocks in which every pair stands once, for 6 the partially balanced
 ones in which every factor stands three times.
+
+Orthogonal blocks, by the same source: with 4 factors three, each of two pairs that share no factor; with 5 two, each of
+pairs that form a ring; with 6 and 7 two, the halves of every 2 x 2 x 2 by the sign of its product. Every factor is then
+moved equally often in every block, and no product leans to one. With 3 factors there are none: a block would hold part
+of a 2 x 2 factorial, whose interaction would be its effect.
 """
 
 from __future__ import annotations
@@ -23,6 +28,12 @@ TRIPLES = {
 """Number of factors → the factors that are moved together."""
 CENTRE_RUNS = 5
 """Where nothing else is asked for."""
+BLOCKS = {4: 3, 5: 2, 6: 2, 7: 2}
+"""Number of factors → orthogonal blocks."""
+BLOCK_OF_PAIR = {4: (0, 1, 2, 2, 1, 0), 5: (0, 0, 1, 1, 1, 1, 0, 0, 1, 0)}
+"""Number of factors → block of each pair AB, AC, … in turn."""
+CENTRE_IN_BLOCKS = {4: 1, 5: 3, 6: 3, 7: 3}
+"""Centre runs of each block where nothing else is asked for."""
 
 
 def box_behnken(factors: int = 3, centre: int = CENTRE_RUNS) -> npt.NDArray[np.int64]:
@@ -44,15 +55,37 @@ def box_behnken(factors: int = 3, centre: int = CENTRE_RUNS) -> npt.NDArray[np.i
     return np.vstack([*edges, np.zeros((centre, factors), dtype=np.int64)])
 
 
+def block_of_edges(factors: int, blocks: int) -> npt.NDArray[np.int64]:
+    """Return the block, from 0, of each edge point of `box_behnken`, shape (edges,).
+
+    Raises StatisticsError, with the number that there is, for another number of blocks than that of the factors.
+    """
+    if blocks != BLOCKS.get(factors):
+        allowed = f"allowed: {BLOCKS[factors]}" if factors in BLOCKS else "there are none that are orthogonal"
+        raise StatisticsError(f"blocks = {blocks}: of a Box–Behnken design of {factors} factors; {allowed}")
+    if factors in BLOCK_OF_PAIR:
+        return np.repeat(BLOCK_OF_PAIR[factors], 4)
+    signs = [np.prod(levels) for _ in TRIPLES[factors] for levels in product((-1, 1), repeat=3)]
+    return (np.array(signs) > 0).astype(np.int64)
+
+
 class BoxBehnken(Design):
     """Three levels per factor, no corners."""
 
     name = "box-behnken"
     title = "Box–Behnken"
     doc = "A full second-order model of 3 to 7 factors, without the corners of the cube."
-    options = ("centre",)
+    options = ("centre", "blocks")
 
     def points(self, factors: int, options: DesignOptions) -> Points:
-        """Edges, then centre runs."""
-        design = box_behnken(factors, CENTRE_RUNS if options.centre is None else options.centre)
-        return Points(design.astype(np.float64))
+        """Edges, then centre runs, with blocks as many in each."""
+        if options.blocks is None:
+            design = box_behnken(factors, CENTRE_RUNS if options.centre is None else options.centre)
+            return Points(design.astype(np.float64))
+        of_edge = block_of_edges(factors, options.blocks)
+        centre = CENTRE_IN_BLOCKS[factors] if options.centre is None else options.centre
+        return Points(
+            box_behnken(factors, centre * options.blocks).astype(np.float64),
+            traits=(f"{options.blocks} blocks",),
+            block=np.concatenate([of_edge, np.repeat(np.arange(options.blocks), centre)]),
+        )

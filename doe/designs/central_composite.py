@@ -3,20 +3,30 @@
 Source: Box and Wilson 1951, J. Roy. Stat. Soc. B 13:1; Box and Hunter 1957, Ann. Math. Stat. 28:195 (rotatability:
 alpha = F^(1/4) with F factorial points). From 5 factors on the factorial part is the half fraction of resolution V or
 higher, in which no main effect or interaction of two is confused with another.
+
+Orthogonal blocks (Box and Hunter 1957, sec. 8): the factorial part in one block or, by products of three factors and
+more, in 2, 4, …, and one of the axial points. With n_F centre runs among the F factorial points and n_A among the 2 k
+axial ones, the squares are clear of the blocks where alpha² = F (2 k + n_A)/(2 (F + n_F)).
 """
 
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
+from doe.designs.blocks import possible_blocks
 from doe.designs.design import ALPHAS, Alpha, Design, DesignOptions, FloatArray, Points
-from doe.designs.factorial import factorial, standard_generators
+from doe.designs.factorial import factor_columns, factorial, factorial_blocks, standard_generators
 from doe.errors import StatisticsError
 
+IntArray = npt.NDArray[np.int64]
 FACTORS = range(2, 8)
 HALVED_FROM = 5
 CENTRE_RUNS = 5
 """Where nothing else is asked for."""
+CENTRE_IN_BLOCKS = {2: (3, 3), 3: (4, 2), 4: (4, 2), 5: (6, 1), 6: (8, 2), 7: (8, 4)}
+"""Factors → centre runs of all factorial blocks and of the axial one, where nothing else is asked for: those with which
+alpha is that of rotatability (2, 4, 5 and 7 factors) or within 3 % of it."""
 
 
 def central_composite(factors: int, centre: int = CENTRE_RUNS, alpha: Alpha = "rotatable") -> FloatArray:
@@ -32,11 +42,51 @@ def central_composite(factors: int, centre: int = CENTRE_RUNS, alpha: Alpha = "r
         raise StatisticsError(f"centre = {centre}: at least one centre run is needed")
     if alpha not in ALPHAS:
         raise StatisticsError(f"alpha = {alpha!r} is not one of {', '.join(ALPHAS)}")
-    corners = factorial(factors, standard_generators(factors, 1) if factors >= HALVED_FROM else ()).astype(np.float64)
+    corners = factorial(factors, _generators(factors)).astype(np.float64)
     distance = 1.0 if alpha == "face-centred" else len(corners) ** 0.25
-    axial = np.repeat(np.eye(factors), 2, axis=0) * np.tile([-distance, distance], factors)[:, None]
-    design = np.vstack([corners, axial, np.zeros((centre, factors))])
+    design = np.vstack([corners, _axial(factors, distance), np.zeros((centre, factors))])
     return design / distance if alpha == "inscribed" else design
+
+
+def central_composite_blocks(
+    factors: int, blocks: int, centre: int | None = None, alpha: Alpha = "rotatable"
+) -> tuple[FloatArray, IntArray]:
+    """Return the design as `central_composite` does, and the block of each row, from 0: factorial blocks, then the
+    axial one, which is the last.
+
+    centre: runs in each block; None: as many as bring alpha near to rotatability. alpha: "inscribed" shrinks the design
+    into the cube. Raises StatisticsError for numbers of blocks that are not orthogonal, or face-centred axial points.
+    """
+    if factors not in FACTORS:
+        raise StatisticsError(f"factors = {factors}: central composite designs are made for 2 to 7 factors")
+    if alpha not in ("rotatable", "inscribed"):
+        raise StatisticsError(f"alpha = {alpha!r}: is given by the blocks; allowed: rotatable (near it) or inscribed")
+    generators, parts = _generators(factors), blocks - 1
+    try:
+        corners = factorial(factors, generators).astype(np.float64)
+        split = factorial_blocks(factors, generators, parts, clear=2).of_row if parts != 1 else np.zeros(len(corners))
+    except StatisticsError:
+        allowed = ", ".join(str(one + 1) for one in (1, *possible_blocks(factor_columns(factors, generators), 2)))
+        raise StatisticsError(
+            f"blocks = {blocks}: of a central composite design of {factors} factors; allowed: {allowed} "
+            "(the last one is of the axial points)"
+        ) from None
+    in_cube, in_axial = CENTRE_IN_BLOCKS[factors] if centre is None else (centre * parts, centre)
+    if in_cube + in_axial < 1:
+        raise StatisticsError(f"centre = {centre}: at least one centre run is needed")
+    distance = np.sqrt(len(corners) * (2 * factors + in_axial) / (2 * (len(corners) + in_cube)))
+    design = np.vstack([corners, _axial(factors, distance), np.zeros((in_cube + in_axial, factors))])
+    block = [split.astype(np.int64), np.full(2 * factors, parts), np.repeat(np.arange(parts), in_cube // parts)]
+    scale = distance if alpha == "inscribed" else 1.0
+    return design / scale, np.concatenate([*block, np.full(in_axial, parts)])
+
+
+def _generators(factors: int) -> tuple[str, ...]:
+    return standard_generators(factors, 1) if factors >= HALVED_FROM else ()
+
+
+def _axial(factors: int, distance: float) -> FloatArray:
+    return np.repeat(np.eye(factors), 2, axis=0) * np.tile([-distance, distance], factors)[:, None]
 
 
 class CentralComposite(Design):
@@ -45,9 +95,15 @@ class CentralComposite(Design):
     name = "central-composite"
     title = "central composite"
     doc = "A full second-order model of 2 to 7 factors: corners, axial points, centre."
-    options = ("centre", "alpha")
+    options = ("centre", "alpha", "blocks")
 
     def points(self, factors: int, options: DesignOptions) -> Points:
-        """Corners, axial points, centre runs."""
+        """Corners, axial points, centre runs, with blocks as many in each."""
+        if options.blocks is not None:
+            design, block = central_composite_blocks(factors, options.blocks, options.centre, options.alpha)
+            furthest = np.abs(design[:, 0]).max() / np.abs(design[0, 0])
+            rotatable = (2 ** (factors - len(_generators(factors)))) ** 0.25
+            said = f"axial points at ±{furthest:.4g} of the corners (rotatable at {rotatable:.4g})"
+            return Points(design, traits=(f"{options.blocks} blocks", options.alpha, said), block=block)
         design = central_composite(factors, CENTRE_RUNS if options.centre is None else options.centre, options.alpha)
         return Points(design, traits=(f"{options.alpha}, axial points at ±{np.abs(design).max():.4g}",))

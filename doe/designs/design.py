@@ -19,6 +19,7 @@ from doe.record import Record
 FloatArray = npt.NDArray[np.float64]
 Alpha = Literal["rotatable", "face-centred", "inscribed"]
 ALPHAS: tuple[str, ...] = get_args(Alpha)
+Model = Literal["linear", "interactions", "quadratic"]
 LETTERS = "ABCDEFGHJKLMNOPQRSTUVWXYZ"
 """Without I, which is the identity."""
 
@@ -39,6 +40,20 @@ class DesignOptions(Record):
     """P of the fraction 2^(k − P) by the usual generators."""
     alpha: Alpha = "rotatable"
     """Where the axial points stand."""
+    blocks: int | None = None
+    """Orthogonal blocks of rows: days, batches, operators; with them, ``centre`` is of each block."""
+    model: Model = "quadratic"
+    """Whose terms an optimal design tells best."""
+    constraints: tuple[tuple[float, ...], ...] = ()
+    """Within which the runs stay: a_1, …, a_k, b of a_1 x_1 + … <= b in coded units."""
+    levels: tuple[int, ...] = ()
+    """Number of names of each factor that is no number; 0 of one that is. Empty: all are."""
+    kept: tuple[tuple[float, ...], ...] = ()
+    """Coded levels of finished runs, beside which others are looked for."""
+    lattice: int | None = None
+    """Steps of a share in a mixture."""
+    nonregular: bool = False
+    """Whether no main effect may be wholly confused with an interaction of two, where a regular table is as usual."""
     seed: int = 1
     """Of a design that is drawn."""
 
@@ -47,6 +62,19 @@ class DesignOptions(Record):
         usual = DesignOptions()
         names = (one.name for one in fields(self) if one.name != "seed")
         return tuple(name for name in names if getattr(self, name) != getattr(usual, name))
+
+
+@dataclass(frozen=True)
+class Efficiency(Record):
+    """How well N runs tell the p terms of a model. d = det(X'X)^(1/p)/N, a = p/(N tr (X'X)^-1), g = p/(N times the
+    largest variance of the prediction), in percent of an orthogonal design; mean_variance of the prediction over the
+    region, in units of the variance of one run.
+    """
+
+    d: float
+    a: float
+    g: float
+    mean_variance: float
 
 
 @dataclass(frozen=True)
@@ -64,6 +92,12 @@ class Points:
     """One line per column that is confused with others, factors by their letters."""
     notes: tuple[str, ...] = ()
     """Sentences that a reader must know."""
+    block: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """In which block each row is run, from 0, shape (rows,). Empty: there are no blocks."""
+    efficiency: Efficiency | None = None
+    """Of a design for a given model."""
+    gained: tuple[str, ...] = ()
+    """Terms of that model that the finished runs alone could not tell from others."""
 
 
 class Design(ABC):
@@ -77,6 +111,8 @@ class Design(ABC):
     """What it is for, in one line."""
     options: ClassVar[tuple[str, ...]] = ()
     """Fields of :class:`DesignOptions` that it takes."""
+    mixture: ClassVar[bool] = False
+    """Whether its factors are the parts of a whole."""
     main_effects_only: ClassVar[bool] = False
     """Whether it is made for a model without interactions and squares."""
 

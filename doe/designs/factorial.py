@@ -3,20 +3,22 @@
 A generator "E=ABC" or "E=-ABC" sets the column of a factor to the (negative) product of others; factors are the letters
 of `factor_letters`. Every generator is a word that equals the identity (I = ABCE); the products of those words are the
 defining relation, its shortest word the resolution. Columns whose product is in the defining relation are one column:
-that is the alias structure. Source: Box and Hunter 1961, Technometrics 3:311; Montgomery 2017, Design and Analysis of
-Experiments, ch. 8.
+that is the alias structure. Of all fractions of one size, one of minimum aberration has the fewest words of length 3,
+of those the fewest of length 4, and so on. Source: Box and Hunter 1961, Technometrics 3:311; Fries and Hunter 1980,
+Technometrics 22:601; Montgomery 2017, Design and Analysis of Experiments, ch. 8.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
 import numpy.typing as npt
 
+from doe.designs.blocks import block_generators, spanned
 from doe.designs.design import LETTERS, Design, DesignOptions, Points, factor_letters, with_centre
 from doe.errors import StatisticsError
 from doe.record import Record
@@ -24,6 +26,9 @@ from doe.record import Record
 IntArray = npt.NDArray[np.int64]
 MOST_BASIC = 10
 """Factors of a full factorial, 1024 runs."""
+ROMAN = ("", "I", "II", "III", "IV", "V", "VI", "VII", "VIII", "IX", "X", "XI")
+MOST_WORDS = 31
+"""Of a defining relation that is printed; the others are counted."""
 GENERATOR = re.compile(r"^\s*([A-Z])\s*=\s*([+\-−]?)\s*([A-Z]+)\s*$")
 
 
@@ -119,18 +124,27 @@ def alias_chains(factors: int, words: Sequence[Word], order: int = 2) -> list[tu
     return chains
 
 
-def standard_generators(factors: int, removed: int) -> tuple[str, ...]:
-    """Return generators of highest resolution for the fractions that are used most, 2^(factors - removed).
+def word_lengths(words: Sequence[Word], factors: int) -> tuple[int, ...]:
+    """Return the number of words of length 1, 2, … `factors` in the defining relation of the generating words."""
+    lengths = [len(word.factors) for word in defining_relation(words)]
+    return tuple(lengths.count(length) for length in range(1, factors + 1))
 
-    Source: Box, Hunter and Hunter 2005, Statistics for Experimenters, table 6.22.
+
+def standard_generators(factors: int, removed: int) -> tuple[str, ...]:
+    """Return generators of the fraction 2^(factors - removed) of minimum aberration.
+
     Raises StatisticsError for a fraction that is not in the list.
     """
+    if removed == 1 and factors - 1 in range(2, MOST_BASIC + 1):
+        letters = factor_letters(factors)
+        return (f"{letters[-1]}={''.join(letters[:-1])}",)
     try:
         return STANDARD_FRACTIONS[factors, removed]
     except KeyError:
-        listed = ", ".join(f"{k}-{p}" for k, p in STANDARD_FRACTIONS)
+        listed = sorted({removed for k, removed in STANDARD_FRACTIONS if k == factors} | {1})
+        have = ", ".join(f"{factors}-{p} ({2 ** (factors - p)} runs)" for p in listed if factors - p <= MOST_BASIC)
         raise StatisticsError(
-            f"no listed fraction 2^({factors}-{removed}); listed: {listed}; others by generators such as E=ABC"
+            f"no listed fraction 2^({factors}-{removed}); listed: {have or 'none'}; others by generators such as E=ABC"
         ) from None
 
 
@@ -150,7 +164,67 @@ STANDARD_FRACTIONS: dict[tuple[int, int], tuple[str, ...]] = {
     (8, 3): ("F=ABC", "G=ABD", "H=BCDE"),
     (8, 4): ("E=BCD", "F=ACD", "G=ABC", "H=ABD"),
 }
-"""(factors, generators) → generators."""
+"""(factors, generators) → generators: up to 8 factors of table 6.22 of Box, Hunter and Hunter 2005, Statistics for
+Experimenters; the others of ``FURTHER_FRACTIONS``."""
+
+FURTHER_FRACTIONS = (
+    (4, range(9, 16), "ABC ABD ACD BCD ABCD AB AC AD BC BD CD"),
+    (5, range(9, 11), "ABCD ABCE ABDE ACDE BCDE"),
+    (5, range(11, 12), "ABC BCD CDE ACD ADE BDE"),
+    (5, range(12, 16), "ABC ABD ACD BCD ABE ACE ADE BCE BDE CDE"),
+    (6, range(9, 10), "ABCD ACEF CDEF"),
+    (6, range(10, 11), "ABCD ABCE ADEF BDEF"),
+    (6, range(11, 12), "ABCD ABCE ABDE ACDEF BCDEF"),
+    (6, range(12, 13), "ABC ABD ACDE ACDF ABEF BCDEF"),
+    (6, range(13, 14), "ABC ABD ABE ACDE ACF ADEF ABCDEF"),
+    (6, range(14, 16), "ABC ABD ABE ACDE ABF ACDF ACEF ADEF ABCDEF"),
+)
+"""Basic factors, numbers of factors, and the right sides of the generators in turn, for 16, 32 and 64 runs.
+
+Generators as the library dexpy lists them (from Design-Expert). That none has less aberration (as in the catalogue of
+Chen, Sun and Wu 1993, Int. Stat. Rev. 61:131) was searched exhaustively: of 16 and 32 runs by the tests, of 64 once."""
+
+for _basic, _numbers, _right in FURTHER_FRACTIONS:
+    for _factors in _numbers:
+        _made = zip(factor_letters(_factors)[_basic:], _right.split(), strict=False)
+        STANDARD_FRACTIONS[_factors, _factors - _basic] = tuple(f"{left}={right}" for left, right in _made)
+
+
+@dataclass(frozen=True)
+class FactorialBlocks:
+    """A split into blocks: of every row, from 0; the generators as words; interactions of two that are lost."""
+
+    of_row: IntArray
+    generators: tuple[str, ...]
+    lost: tuple[str, ...]
+
+
+def factor_columns(factors: int, generators: Sequence[str]) -> tuple[int, ...]:
+    """Return the columns of the factors as `doe.designs.blocks` counts them: bits of the basic factors."""
+    made = dict(generator_words(factors, generators))
+    basic = [k for k in range(factors) if k not in made]
+    bit = {factor: 1 << place for place, factor in enumerate(basic)}
+    return tuple(bit[k] if k in bit else sum(bit[one] for one in made[k].factors - {k}) for k in range(factors))
+
+
+def factorial_blocks(factors: int, generators: Sequence[str], blocks: int, clear: int = 1) -> FactorialBlocks:
+    """Return the best split of `factorial(factors, generators)` into `blocks`, with effects of `clear` factors kept.
+
+    Raises StatisticsError where there is none.
+    """
+    columns = factor_columns(factors, generators)
+    chosen = block_generators(columns, blocks, clear)
+    basic = [k for k in range(factors) if columns[k].bit_count() == 1]
+    words = [frozenset(k for k in basic if columns[k] & column) for column in chosen]
+    design = factorial(factors, generators)
+    signs = [design[:, sorted(word)].prod(axis=1) > 0 for word in words]
+    contrasts = set(spanned(chosen))
+    lost = [pair for pair in combinations(range(factors), 2) if columns[pair[0]] ^ columns[pair[1]] in contrasts]
+    return FactorialBlocks(
+        np.sum([sign.astype(np.int64) << place for place, sign in enumerate(signs)], axis=0),
+        tuple(Word(1, word).text() for word in words),
+        tuple(Word(1, frozenset(pair)).text() for pair in lost),
+    )
 
 
 class Factorial(Design):
@@ -158,23 +232,61 @@ class Factorial(Design):
 
     name = "factorial"
     title = "two-level factorial"
-    doc = "Two levels: every combination, or a fraction by generators; main effects and interactions."
-    options = ("centre", "generators", "fraction")
+    doc = "Two levels: every combination, or a fraction by size or generators; main effects and interactions."
+    options = ("runs", "centre", "generators", "fraction", "blocks")
 
     def points(self, factors: int, options: DesignOptions) -> Points:
-        """In standard order; centre runs only where they are asked for."""
-        if options.generators and options.fraction:
-            raise StatisticsError("fraction: has generators of its own; allowed: a fraction or generators")
-        generators = options.generators or (standard_generators(factors, options.fraction) if options.fraction else ())
+        """In standard order; centre runs only where they are asked for, with blocks as many in each."""
+        asked = [name for name in ("generators", "fraction", "runs") if getattr(options, name)]
+        if len(asked) > 1:
+            raise StatisticsError(f"{asked[1]}: has generators of its own; allowed: {asked[1]} or {asked[0]}")
+        removed = options.fraction if options.runs is None else _removed(factors, options.runs)
+        generators = options.generators or (standard_generators(factors, removed) if removed else ())
         name = f"2^({factors}−{len(generators)})" if generators else f"2^{factors}"
-        coded = with_centre(factorial(factors, generators), options.centre)
-        return Points(coded, traits=(name,), generators=tuple(generators), aliases=_aliases(factors, generators))
+        coded = factorial(factors, generators)
+        aliases, notes = _aliases(factors, generators), _resolution(factors, generators)
+        if options.blocks is None:
+            points = Points(with_centre(coded, options.centre), traits=(name,))
+        else:
+            split = factorial_blocks(factors, generators, options.blocks)
+            centre = np.repeat(np.arange(options.blocks), options.centre or 0)
+            points = Points(
+                with_centre(coded, len(centre)),
+                traits=(name, f"{options.blocks} blocks by {', '.join(split.generators)}"),
+                block=np.concatenate([split.of_row, centre]),
+            )
+            if split.lost:
+                notes = (*notes, f"Interactions that cannot be told from the blocks: {', '.join(split.lost)}.")
+        return replace(points, generators=tuple(generators), aliases=aliases, notes=notes)
+
+
+def _removed(factors: int, runs: int) -> int:
+    """P of the fraction of a size."""
+    sizes = [2**factors] if factors <= MOST_BASIC else []
+    if 2 <= factors - 1 <= MOST_BASIC:
+        sizes.append(2 ** (factors - 1))
+    sizes += [2 ** (k - removed) for k, removed in STANDARD_FRACTIONS if k == factors]
+    if runs not in sizes:
+        allowed = ", ".join(map(str, sorted(set(sizes)))) or "none, but by generators such as E=ABC"
+        raise StatisticsError(f"runs = {runs}: no listed factorial of {factors} factors; allowed: {allowed}")
+    return factors - (runs.bit_length() - 1)
+
+
+def _resolution(factors: int, generators: Sequence[str]) -> tuple[str, ...]:
+    """A sentence: the shortest words of a fraction."""
+    if not generators:
+        return ()
+    lengths = word_lengths([word for _, word in generator_words(factors, generators)], factors)
+    counts = [(length, number) for length, number in enumerate(lengths, start=1) if number]
+    listed = ", ".join(f"{number} of length {length}" for length, number in counts[:3])
+    return (f"Resolution {ROMAN[counts[0][0]]}; words of the defining relation: {listed}.",)
 
 
 def _aliases(factors: int, generators: Sequence[str]) -> tuple[str, ...]:
     if not generators:
         return ()
     words = [word for _, word in generator_words(factors, generators)]
-    relation = " = ".join(word.text() for word in defining_relation(words))
+    relation = [word.text() for word in defining_relation(words)]
+    more = f" and {len(relation) - MOST_WORDS} more" if len(relation) > MOST_WORDS else ""
     chains = [" = ".join(word.text() or "mean" for word in chain) for chain in alias_chains(factors, words)]
-    return (f"I = {relation}", *(chain for chain in chains if "=" in chain))
+    return (f"I = {' = '.join(relation[:MOST_WORDS])}{more}", *(chain for chain in chains if "=" in chain))

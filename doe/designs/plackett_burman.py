@@ -5,6 +5,11 @@ generator rows in three blocks A | B | C; R's FrF2 package and the transcription
 github.com/paulo-raca/plackett-burman print the same) and 40 (the 20-run table doubled). Every column is orthogonal to
 every other and sums to zero, so N runs estimate N - 1 main effects independently of each other. Main effects are not
 free of two-factor interactions: see `interaction_aliases`.
+
+The printed tables of 8, 16 and 32 runs are regular fractions of a factorial, in which an interaction is a main effect
+wholly. There is no other table of 8 runs. Of 16 and 32 runs ``nonregular_table`` has one in which a main effect holds
+no interaction wholly, so that every three factors are seen in all combinations (projectivity 3: Box and Tyssedal 1996,
+Biometrika 83:950).
 """
 
 from __future__ import annotations
@@ -45,6 +50,14 @@ GENERATOR_ROWS_28 = (
 )
 SIZES = tuple(range(8, 49, 4))
 """Numbers of runs that have a table."""
+PALEY_32 = "+++-++-++++---+-+-+++----+--+--"
+"""First row of the cyclic design of 32 runs: + at 0 and the squares modulo 31 (Paley 1933, J. Math. Phys. 12:311)."""
+TURNED_8 = (0, 1, 2, 4, 5, 6, 3)
+"""Columns of the table of 8 runs in an order in which none of its seven triples of columns with product ±1 is one."""
+ORDER_16 = (11, 13, 10, 6, 9, 12, 8, 7, 5, 2, 3, 4, 1, 0, 14)
+"""Columns of the table of 16 runs: with up to 8 of the first, no two interactions of two are the same either."""
+MOST_NONREGULAR = {16: 14, 32: 31}
+"""Runs → factors of a table without an interaction that is one main effect wholly."""
 MOST_ALIASES = 12
 """Interactions that are listed per factor; the others are counted."""
 
@@ -61,6 +74,29 @@ def plackett_burman(runs: int) -> IntArray:
     if runs == 40:
         return _doubled(plackett_burman(20))
     raise StatisticsError(f"runs = {runs} has no Plackett–Burman table here; allowed are {', '.join(map(str, SIZES))}")
+
+
+def nonregular_table(runs: int) -> IntArray:
+    """Return a table of 16 or 32 runs like `plackett_burman`'s that is no regular fraction.
+
+    Of 16: columns (h, k) and (h, -k) with h and k those of two tables of 8 runs, and last the one that tells the halves
+    apart, (1, -1). This last one is each of seven interactions wholly, as one column at least is of every table of 16
+    runs that is made by doubling; the other 14 hold half of an interaction at most, the 31 of 32 runs a quarter.
+    Raises StatisticsError for other numbers of runs.
+    """
+    if runs == 32:
+        return _cyclic(_levels(PALEY_32))
+    if runs == 16:
+        upper = plackett_burman(8)
+        lower, apart = upper[:, TURNED_8], np.ones((8, 1), dtype=np.int64)
+        return np.vstack([np.hstack([upper, upper, apart]), np.hstack([lower, -lower, -apart])])[:, ORDER_16]
+    only = ": every table of 8 runs is a regular fraction" if runs == 8 else ""
+    raise StatisticsError(f"nonregular: no such table of {runs} runs{only}; allowed: 16 and 32 runs")
+
+
+def tables(runs: int) -> tuple[IntArray, ...]:
+    """Return every table of a size; raises StatisticsError where there is none."""
+    return plackett_burman(runs), *([nonregular_table(runs)] if runs in MOST_NONREGULAR else [])
 
 
 def smallest_size(factors: int) -> int:
@@ -140,29 +176,45 @@ class PlackettBurman(Design):
     name = "plackett-burman"
     title = "Plackett–Burman"
     doc = "Main effects of up to 47 factors in 8 to 48 runs; folded over, clear of interactions of two."
-    options = ("runs", "centre", "fold")
+    options = ("runs", "centre", "fold", "nonregular")
     main_effects_only = True
 
     def points(self, factors: int, options: DesignOptions) -> Points:
         """The smallest table with a column for each factor, or that of ``runs`` rows; the mirror image after it."""
         least = smallest_size(factors)
+        if options.nonregular:
+            least = next((size for size, most in MOST_NONREGULAR.items() if most >= factors), least)
         size = least if options.runs is None else options.runs
-        table = plackett_burman(size)
-        if factors > size - 1:
-            raise StatisticsError(
-                f"runs {size}: has {size - 1} columns for {factors} factors; allowed: at least {least}"
-            )
+        table = nonregular_table(size) if options.nonregular else plackett_burman(size)
+        most = MOST_NONREGULAR[size] if options.nonregular else size - 1
+        if factors > most:
+            raise StatisticsError(f"runs {size}: has {most} columns for {factors} factors; allowed: at least {least}")
         levels = fold_over(table) if options.fold else table
         rows = with_centre(levels, options.centre)
-        traits = (f"{size} runs, {size - 1 - factors} columns without a factor",)
+        traits = [f"{size} runs, {size - 1 - factors} columns without a factor"]
+        traits += ["nonregular"] if options.nonregular else []
         lines = alias_lines(levels[:, :factors])
         return Points(
             rows[:, :factors],
             rows[:, factors:],
-            traits=(*traits, "folded over") if options.fold else traits,
+            traits=(*traits, "folded over") if options.fold else tuple(traits),
             aliases=lines,
-            notes=() if lines else _clear_of_interactions(levels[:, :factors]),
+            notes=_confused(levels[:, :factors], size) if lines else _clear_of_interactions(levels[:, :factors]),
         )
+
+
+def _confused(design: IntArray, size: int) -> tuple[str, ...]:
+    """A sentence where an interaction of two is one main effect wholly, and what would tell them apart."""
+    shares, _ = interaction_aliases(design)
+    if np.abs(shares).max() < 1 - 1e-9:
+        return ()
+    other = "no other table of 8 runs is better; " if size == 8 else ""
+    if design.shape[1] <= MOST_NONREGULAR.get(size, 0):
+        other = "--nonregular gives as many runs in which none is; "
+    return (
+        "Some interactions of two factors are one main effect wholly, and nothing in these runs tells them apart: "
+        f"{other}--fold frees the main effects.",
+    )
 
 
 def alias_lines(design: IntArray) -> tuple[str, ...]:

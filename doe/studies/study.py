@@ -117,7 +117,7 @@ def _chosen(table: DesignTable, key: str, usual: ChosenDesign) -> ChosenDesign:
     design = DESIGNS[one_of(table.design or usual.design.name, f"{key}.design", DESIGNS)]
     values = table.model_dump(exclude={"design"}, exclude_unset=True)
     for name in values:
-        if name not in (allowed := ("seed", *design.options)):
+        if name not in (allowed := ("seed", *(one for one in design.options if one in DesignTable.model_fields))):
             raise StudyFileError(f"{key}.{name}: unknown key; allowed: {', '.join(sorted(('design', *allowed)))}")
     options = usual.options if design.name == usual.design.name else IN_STUDIES
     return ChosenDesign(design, replace(options, **values))
@@ -217,6 +217,7 @@ class DesignTable(TomlTable):
     runs: Annotated[int, Whole(0)] | None = None
     centre: Annotated[int, Whole(0)] | None = None
     fold: StrictBool = False
+    nonregular: StrictBool = False
     generators: Annotated[tuple[str, ...], Names()] = ()
     fraction: Annotated[int, Whole(0)] = 0
     alpha: Alpha = "face-centred"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from explorer.design.choices import ModelOrder
+from explorer.design.choices import ModelOrder, Reduction
 
 
 def analyse(
@@ -16,6 +16,9 @@ def analyse(
     target_error: float = typer.Option(0.0, min=0.0, help="Standard error of the target, in its unit."),
     model: ModelOrder | None = typer.Option(None, help="By default the highest order that the runs can bear."),
     terms: str = typer.Option("", metavar="A,B,A*B,…", help="Instead of an order, the terms; what they need is added."),
+    reduce: Reduction | None = typer.Option(
+        None, help="Drop terms one by one, factors after their products: by AICc, or while p > 0.05."
+    ),
     only: str = typer.Option("", metavar="NAME,…", help="Only these factors; the others count as scatter."),
     block: str = typer.Option("", metavar="NAME", help="Column of days, batches or operators: a fixed effect each."),
     factors: str | None = typer.Option(None, metavar="FILE", help="Factors file, for a sheet that declares none."),
@@ -47,6 +50,7 @@ def analyse(
         terms=_names(terms),
         only=_names(only),
         block=block,
+        reduction=reduce,
         out=out,
         author=author,
         notes=notes,

@@ -12,15 +12,17 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.analysis.analyse import DesignAnalysis, ResponseTarget, analyse_design
+from doe.analysis.mixture import MixtureOrder, fit_mixture
 from doe.analysis.models import ORDERS, Order
 from doe.analysis.steepest_ascent import Region
 from doe.analysis.surface_anova import FULL
 from doe.designs import DESIGNS, factor_letters
 from doe.errors import StatisticsError
-from explorer.design.choices import ModelOrder
+from explorer.design.choices import ModelOrder, Reduction
 from explorer.design.factors_file import read_factors, region_of
 from explorer.design.filled_sheet import Runs, read_sheet, runs_of
 from explorer.design.result import DesignResult, Response, RunCount, SheetFactor
+from explorer.design.run_plan import BLOCK
 from explorer.errors import CommandError
 from explorer.files.run_folder import appearing, json_text
 from explorer.files.run_result import made_today, versions
@@ -53,6 +55,7 @@ class AnalyseOrder:
     only: tuple[str, ...] = ()
     block: str = ""
     """Column of the block in which each run was made."""
+    reduction: Reduction | None = None
     out: Path | None = field(default=None)
     author: str = ""
     notes: str = ""
@@ -66,7 +69,7 @@ def run_analyse(order: AnalyseOrder) -> DesignResult:
     path = asset_path("runs", order.sheet)
     factors = read_factors(asset_path("designs", order.factors)).factors if order.factors else ()
     sheet = read_sheet(path, factors)
-    responses = [name for name in sheet.responses if name != order.block and not sheet.is_words(name)]
+    responses = [name for name in sheet.responses if name not in (order.block, BLOCK) and not sheet.is_words(name)]
     runs = runs_of(sheet, order.response or _only_response(sheet.path, responses), order.only, order.block)
     result = analyse_runs(runs, order)
     if order.out is not None:
@@ -78,15 +81,34 @@ def run_analyse(order: AnalyseOrder) -> DesignResult:
 def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
     """The analysis of one response."""
     region = region_of(runs.factors)
+    named = [factor for factor in runs.factors if factor.levels]
+    if named and order.target is not None:
+        raise CommandError(
+            f"--target: {named[0].name} is no number, and has no settings between its levels; "
+            "allowed: the runs of one level in a sheet of their own"
+        )
+    if _whole(runs, region):
+        return _result(runs, order, _mixture(runs, region, order))
     _refuse_dependent(runs, region, order.sheet)
     reference = np.array([factor.reference for factor in runs.factors])
     target = None if order.target is None else ResponseTarget(order.target, order.target_error, reference)
     try:
         found = analyse_design(
-            runs.coded, runs.responses, region, _order(runs, order), _symbols(runs, order.terms), target, runs.blocks
+            runs.coded,
+            runs.responses,
+            region,
+            _order(runs, order),
+            _symbols(runs, order.terms),
+            target,
+            runs.blocks,
+            None if order.reduction is None else order.reduction.value,
         )
     except StatisticsError as error:
         raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
+    return _result(runs, order, replace(found, notes=(*found.notes, *_run_notes(runs, region, found))))
+
+
+def _result(runs: Runs, order: AnalyseOrder, analysis: DesignAnalysis) -> DesignResult:
     return DesignResult(
         sheet=order.sheet,
         design=runs.design,
@@ -96,11 +118,49 @@ def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
         factors=_factors(runs),
         coded=runs.coded,
         target=order.target,
-        analysis=replace(found, notes=(*found.notes, *_run_notes(runs, region, found))),
+        analysis=analysis,
         command=_command(order),
         versions=versions(),
         about=made_today(order.author, order.notes),
     )
+
+
+def _whole(runs: Runs, region: Region) -> bool:
+    """Whether all factors are the parts of a mixture: they add up to one number in every run with a result, and nothing
+    else ties them.
+    """
+    valid = ~np.isnan(runs.responses).all(axis=1)
+    levels = region.natural(runs.coded[valid])
+    if len(runs.factors) < 2 or any(factor.levels for factor in runs.factors) or len(levels) <= len(runs.factors):
+        return False
+    if (levels < -SAME).any():
+        return False  # what can be below zero is no amount
+    one_sum = bool(np.ptp(levels.sum(axis=1)) < SAME * np.abs(levels).max())
+    return one_sum and bool(np.linalg.matrix_rank(levels - levels.mean(axis=0), tol=1e-6) == len(runs.factors) - 1)
+
+
+def _mixture(runs: Runs, region: Region, order: AnalyseOrder) -> DesignAnalysis:
+    """Scheffé's polynomial of a mixture; raises CommandError for what is not for one."""
+    asked = {
+        "--target": order.target is not None,
+        "--terms": order.terms,
+        "--block": order.block,
+        "--reduce": order.reduction,
+    }
+    for option, given in asked.items():
+        if given:
+            raise CommandError(f"{option}: is not for a mixture: in {order.sheet} the factors add up to one sum")
+    polynomial: MixtureOrder | None = None
+    if order.order is not None:
+        polynomial = "linear" if order.order == ModelOrder.LINEAR else "quadratic"
+    lows = np.array([factor.low for factor in runs.factors])
+    names = factor_letters(len(runs.factors))
+    try:
+        found = fit_mixture(region.natural(runs.coded), runs.responses, lows, names, polynomial)
+    except StatisticsError as error:
+        raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
+    note = "A mixture: the factors add up to one sum in every run, and Scheffé's polynomial stands for the model."
+    return DesignAnalysis((), None, None, None, (note,), mixture=found)
 
 
 def _refuse_dependent(runs: Runs, region: Region, sheet: str) -> None:
@@ -136,6 +196,9 @@ def _run_notes(runs: Runs, region: Region, found: DesignAnalysis) -> list[str]:
     """What single runs ask for: levels far outside a factor's range, and runs without which there is no model."""
     row, replicate = np.nonzero(~np.isnan(runs.responses))
     labels, notes = _labels(runs), []
+    for factor in runs.factors:
+        if factor.levels:
+            notes.append(f"{factor.name}: −1 is {factor.levels[0]}, +1 is {factor.levels[1]}.")
     for label, k in zip(labels, row, strict=True):
         for factor, coded, level in zip(runs.factors, runs.coded[k], region.natural(runs.coded[k]), strict=True):
             if abs(coded) > FAR:
@@ -276,6 +339,7 @@ def _command(order: AnalyseOrder) -> tuple[str, ...]:
         ("--terms", order.terms, ",".join),
         ("--only", order.only, ",".join),
         ("--block", order.block, str),
+        ("--reduce", order.reduction, str),
     ]
     for option, value, write in options:
         if value is not None and value not in ("", ()):

@@ -14,6 +14,13 @@ class Alpha(StrEnum):
     INSCRIBED = "inscribed"
 
 
+class Reduction(StrEnum):
+    """Rules by which terms are dropped from a polynomial."""
+
+    AICC = "aicc"
+    P = "p"
+
+
 class ModelOrder(StrEnum):
     """Orders of the polynomial."""
 

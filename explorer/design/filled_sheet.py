@@ -20,7 +20,7 @@ import numpy.typing as npt
 from doe.analysis.surface import Blocks
 from doe.errors import StudyFileError
 from doe.table_file import CellTable, read_table
-from explorer.design.factors_file import RESERVED, DesignFactor, make_factor, no_repeats, region_of
+from explorer.design.factors_file import RESERVED, DesignFactor, make_factor, make_names, no_repeats, region_of
 from explorer.errors import CommandError
 
 Array = npt.NDArray[np.float64]
@@ -72,6 +72,20 @@ class Sheet:
             )
         return value
 
+    def level(self, position: int, factor: DesignFactor) -> float:
+        """The level of a factor, for names their coded value; NaN where the cell is empty."""
+        if not factor.levels:
+            return self.number(position, factor.name)
+        text = self.cells[position][self.columns[factor.name]]
+        if text in EMPTY_CELLS:
+            return math.nan
+        if text not in factor.levels:
+            raise CommandError(
+                f"{self.path}, line {self.lines[position]}, column {factor.name}: {short(text)}; "
+                f"allowed: {', '.join(factor.levels)}"
+            )
+        return factor.codes[factor.levels.index(text)]
+
 
 def read_sheet(path: Path, factors: Sequence[DesignFactor] = ()) -> Sheet:
     """Read a sheet; ``factors`` take the place of those that its comments declare.
@@ -118,6 +132,11 @@ def _declarations(path: Path, table: CellTable) -> tuple[str, tuple[DesignFactor
             design = parts[1]
         if parts[0] == "factor":
             factors.append(_declared(path, line, parts[1:]))
+        if parts[0] == "levels" and len(parts) > 1:
+            try:
+                factors.append(make_names(parts[1], tuple(parts[2:]), "factor"))
+            except StudyFileError as error:
+                raise CommandError(f"{path}, line {line}: {error}") from None
     try:
         no_repeats(tuple(factors), ())
     except StudyFileError as error:
@@ -181,6 +200,13 @@ def runs_of(sheet: Sheet, response: str, only: Sequence[str] = (), block: str = 
     Raises CommandError as `read_sheet` does.
     """
     factors = _kept(sheet, only)
+    for factor in factors:
+        if len(factor.levels) > 2:
+            others = ",".join(other.name for other in factors if len(other.levels) < 3)
+            raise CommandError(
+                f"{sheet.path}: {factor.name} has {len(factor.levels)} levels that are no numbers; "
+                f"allowed: its effect beside the model of the others, --only {others} --block {factor.name}"
+            )
     if block and (block not in sheet.columns or block == response or block in [factor.name for factor in factors]):
         offered = ", ".join(name for name in sheet.responses if name != response) or "none"
         raise CommandError(f"{sheet.path}: --block {block}: no column of blocks; the other columns are {offered}")
@@ -222,6 +248,27 @@ def runs_of(sheet: Sheet, response: str, only: Sequence[str] = (), block: str = 
     )
 
 
+def finished_runs(sheet: Sheet, responses: Sequence[str]) -> tuple[Array, tuple[tuple[str, ...], ...]]:
+    """The runs that have a result: coded levels, shape (runs, factors), and the cells of the responses of each.
+
+    Raises CommandError as `read_sheet` does, and where no run has one.
+    """
+    known = [name for name in responses if name in sheet.columns]
+    filled = [
+        k for k, row in enumerate(sheet.cells) if any(row[sheet.columns[name]] not in EMPTY_CELLS for name in known)
+    ]
+    if not filled:
+        raise CommandError(f"{sheet.path}: no run with a result in {', '.join(responses)}; allowed: a filled sheet")
+    natural = np.array([_levels(sheet, sheet.factors, k, needed=True) for k in filled])
+    cells = []
+    for k in filled:
+        texts = [sheet.cells[k][sheet.columns[name]] if name in known else "" for name in responses]
+        numbers = [sheet.table.number(text) for text in texts]
+        pairs = zip(texts, numbers, strict=True)
+        cells.append(tuple(text if math.isnan(number) else f"{number:.12g}" for text, number in pairs))
+    return _snapped(region_of(sheet.factors).coded(natural)), tuple(cells)
+
+
 def _block_names(sheet: Sheet, block: str, positions: Sequence[int]) -> tuple[str, ...]:
     """What the blocks of the runs at ``positions`` are called, in the order of the sheet."""
     if not block:
@@ -251,7 +298,7 @@ def _kept(sheet: Sheet, only: Sequence[str]) -> tuple[DesignFactor, ...]:
 
 def _levels(sheet: Sheet, factors: Sequence[DesignFactor], position: int, needed: bool) -> list[float]:
     """Levels of a run; an empty one is refused where the run has a response."""
-    levels = [sheet.number(position, factor.name) for factor in factors]
+    levels = [sheet.level(position, factor) for factor in factors]
     for factor, level in zip(factors, levels, strict=True):
         if needed and math.isnan(level):
             raise CommandError(

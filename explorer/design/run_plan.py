@@ -5,22 +5,29 @@
 row,replicate,run,seed,shear_modulus [MPa],…,angle_of_repose_deg
 3,1,1,3,46.18,…,
 
+A factor of names is declared by ``# levels | solvent | water | ethanol``.
+
 One line per run, in the order to run them. ``row`` is the row of the design in standard order, ``seed`` a number of its
 own for an engine that draws at random. An empty cell is a run that is missing. Lines that begin with # are comments.
+With blocks there is a column ``block`` as well, 1, 2, …: all runs of one block come before those of the next.
 """
 
 from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from doe.designs import DESIGNS, Design, DesignOptions, Points
-from explorer.design.choices import Alpha
-from explorer.design.factors_file import FactorsFile, region_of
+from doe.errors import StatisticsError
+from explorer.design.choices import Alpha, ModelOrder
+from explorer.design.factors_file import DesignFactor, FactorsFile, coded_constraint, is_number, region_of
+from explorer.design.filled_sheet import finished_runs, read_sheet
 from explorer.errors import CommandError
 
 Array = npt.NDArray[np.float64]
@@ -33,9 +40,18 @@ OPTIONS = {
     "fraction": "--fraction",
     "alpha": "--alpha",
     "centre": "--centre",
+    "blocks": "--blocks",
+    "nonregular": "--nonregular",
+    "model": "--model",
+    "constraints": "--constraint",
+    "levels": "levels of a factor that is no number",
+    "kept": "--augment",
+    "lattice": "--lattice",
 }
 """Option of a design → how it is spelt on the command line."""
 COLUMNS = ("row", "replicate", "run", "seed")
+BLOCK = "block"
+"""Column of a sheet whose runs are made in blocks."""
 SEPARATOR = " | "
 
 
@@ -53,6 +69,14 @@ class DesignOrder:
     fraction: int = 0
     alpha: Alpha = Alpha.ROTATABLE
     standard_order: bool = False
+    blocks: int | None = None
+    nonregular: bool = False
+    model: ModelOrder | None = None
+    constraints: tuple[str, ...] = ()
+    """In the factors' units, as "A + B <= 1"."""
+    lattice: int | None = None
+    augment: Path | None = None
+    """Sheet whose finished runs are kept."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +84,8 @@ class RunPlan:
     """A design and its runs.
 
     ``sequence`` (runs, 2): row of the points and replicate, from 0, in the order in which they are run. ``seeds``
-    (runs,): a different one for every run.
+    (runs,): a different one for every run. ``block`` (runs,): of each run, from 0; empty where there are none.
+    ``finished``: cells of the responses of the runs that are kept, which stand first.
     """
 
     design: Design
@@ -68,6 +93,8 @@ class RunPlan:
     sequence: npt.NDArray[np.int64]
     seeds: npt.NDArray[np.int64]
     seed: int
+    block: npt.NDArray[np.int64]
+    finished: tuple[tuple[str, ...], ...] = ()
 
     @property
     def coded(self) -> Array:
@@ -85,29 +112,104 @@ def make_plan(order: DesignOrder, file: FactorsFile) -> RunPlan:
     if order.design not in DESIGNS:
         raise CommandError(f"design {order.design[:40]!r}: allowed are {', '.join(DESIGNS)}")
     design, seed = DESIGNS[order.design], _first(order.seed, file.seed, 1)
+    replicates = _first(order.replicates, file.replicates, 1)
+    kept = np.zeros((0, len(file.factors)))
+    finished: tuple[tuple[str, ...], ...] = ()
+    if order.augment is not None:
+        if "kept" in design.options and (replicates > 1 or order.blocks):
+            raise CommandError("--augment: the finished runs stay as they are; allowed: --replicates 1, no --blocks")
+        kept, finished = finished_runs(read_sheet(order.augment, file.factors), file.responses)
+    # Blocks of whole replicates hold every row equally often, in any design.
+    of_replicates = order.blocks if order.blocks is not None and replicates % order.blocks == 0 else None
+    names = tuple(len(factor.levels) for factor in file.factors)
     options = DesignOptions(
-        order.runs, order.centre, order.fold, order.generators, order.fraction, order.alpha.value, seed
+        runs=order.runs,
+        centre=order.centre,
+        fold=order.fold,
+        generators=order.generators,
+        fraction=order.fraction,
+        alpha=order.alpha.value,
+        seed=seed,
+        blocks=None if of_replicates else order.blocks,
+        nonregular=order.nonregular,
+        lattice=order.lattice,
+        model=(order.model or ModelOrder.QUADRATIC).value,
+        constraints=tuple(coded_constraint(text, file.factors) for text in order.constraints),
+        levels=names if any(names) and "levels" in design.options else (),
+        kept=tuple(map(tuple, kept.tolist())),
     )
-    _refuse_foreign_options(design, options)
+    asked = (*options.given(), *(["model"] if order.model is not None else []))
+    _refuse_foreign_options(design, options, asked)
+    if order.blocks and BLOCK in (*(factor.name for factor in file.factors), *file.responses):
+        raise CommandError(f"--blocks: the sheet's column {BLOCK!r} is a name of the factors file; allowed: another")
     if "centre" in design.options:
         options = replace(options, centre=file.centre if order.centre is None else order.centre)
-    points = design.points(len(file.factors), options)
-    replicates = _first(order.replicates, file.replicates, 1)
+    if design.mixture:
+        _require_parts(file)
+    points = _points(design, len(file.factors), options)
+    _refuse_levels_between_names(design, file, points.coded)
     rows = len(points.coded)
     if rows * replicates > MOST_RUNS:
         raise CommandError(f"{rows} rows × {replicates} replicates: allowed are {MOST_RUNS} runs")
     every = np.array([(row, replicate) for replicate in range(replicates) for row in range(rows)])
+    if of_replicates:
+        block = every[:, 1] * of_replicates // replicates
+    else:
+        block = points.block[every[:, 0]] if len(points.block) else points.block
     seeds = _first(file.first_seed, 1) + np.arange(len(every))
     turn = np.arange(len(every)) if order.standard_order else np.random.default_rng(seed).permutation(len(every))
-    return RunPlan(design, points, every[turn], seeds[turn], seed)
+    if len(block):
+        turn = turn[np.argsort(block[turn], kind="stable")]
+        block = block[turn]
+    if finished:
+        turn = np.concatenate([np.arange(len(finished)), turn[turn >= len(finished)]])
+    return RunPlan(design, points, every[turn], seeds[turn], seed, block, finished)
 
 
-def _refuse_foreign_options(design: Design, options: DesignOptions) -> None:
+def _require_parts(file: FactorsFile) -> None:
+    """The high of a part is what is left where all others are at their lows: one room for all."""
+    rooms = [factor.high - factor.low for factor in file.factors]
+    named = [factor.name for factor in file.factors if factor.levels]
+    if named:
+        raise CommandError(f"mixture: {named[0]} is no number; allowed: parts with low and high")
+    if max(rooms) - min(rooms) > 1e-9 * max(rooms):
+        listed = ", ".join(f"{factor.name} {room:g}" for factor, room in zip(file.factors, rooms, strict=True))
+        raise CommandError(
+            f"mixture: high less low is not the same for every part ({listed}); allowed: the whole less the sum of all "
+            "lows, as of 0 and 1, or of 0 and 100"
+        )
+
+
+def _refuse_levels_between_names(design: Design, file: FactorsFile, coded: Array) -> None:
+    """A factor of names is run at them, and at nothing between or beyond."""
+    for factor, column in zip(file.factors, coded.T, strict=True):
+        if factor.levels and not np.isclose(column[:, None], factor.codes, atol=1e-9).any(axis=1).all():
+            takers = ", ".join(other.name for other in DESIGNS.values() if "levels" in other.options)
+            raise CommandError(
+                f"{design.name}: runs {factor.name} between or beyond its levels {', '.join(factor.levels)}; "
+                f"allowed: {takers}, or two levels in a two-level design"
+            )
+
+
+def _points(design: Design, factors: int, options: DesignOptions) -> Points:
+    """The rows; blocks that a design has not are refused with what there is for every design."""
+    try:
+        return design.points(factors, options)
+    except StatisticsError as error:
+        if options.blocks is None or not str(error).startswith("blocks"):
+            raise
+        raise CommandError(
+            f"--{error}; or whole replicates in each: --replicates {options.blocks} --blocks {options.blocks}"
+        ) from None
+
+
+def _refuse_foreign_options(design: Design, options: DesignOptions, asked: Iterable[str]) -> None:
     """An option of another design is a misunderstanding, not to be passed over."""
-    for name in options.given():
+    for name in asked:
         if name not in design.options:
             takers = ", ".join(other.name for other in DESIGNS.values() if name in other.options)
-            raise CommandError(f"{OPTIONS[name]}: is not for {design.name}; it belongs to {takers}")
+            other = f", or {options.blocks} replicates of any design" if name == "blocks" else ""
+            raise CommandError(f"{OPTIONS[name]}: is not for {design.name}; it belongs to {takers}{other}")
     if options.runs is not None and options.runs > MOST_RUNS:
         raise CommandError(f"--runs {options.runs}: allowed are {MOST_RUNS}")
 
@@ -116,27 +218,60 @@ def _first(*values: int | None) -> int:
     return next(value for value in values if value is not None)
 
 
-def sheet_text(plan: RunPlan, file: FactorsFile) -> str:
-    """The empty sheet."""
+def sheet_text(plan: RunPlan, file: FactorsFile, decimal_comma: bool = False) -> str:
+    """The empty sheet as CSV; with decimal commas, semicolons are between the cells, as spreadsheets have it there."""
+    comments, rows = _sheet(plan, file)
     stream = io.StringIO()
-    stream.write(
+    stream.writelines(f"{line}\n" for line in comments)
+    writer = csv.writer(stream, delimiter=";" if decimal_comma else ",", lineterminator="\n")
+    writer.writerow(rows[0])
+    for row in rows[1:]:
+        writer.writerow([cell.replace(".", ",") if decimal_comma and is_number(cell) else cell for cell in row])
+    return stream.getvalue()
+
+
+def sheet_workbook(plan: RunPlan, file: FactorsFile) -> bytes:
+    """The empty sheet as a workbook (.xlsx); what is a number is one there."""
+    # Imported where it is used: it takes a second, and few sheets are workbooks.
+    import pandas
+
+    comments, rows = _sheet(plan, file)
+    cells: list[list[str | float | None]] = [[line, *[None] * (len(rows[0]) - 1)] for line in comments]
+    cells += [[float(cell) if is_number(cell) else cell or None for cell in row] for row in rows]
+    stream = io.BytesIO()
+    pandas.DataFrame(cells, dtype=object).to_excel(stream, header=False, index=False, engine="openpyxl")
+    return stream.getvalue()
+
+
+def _sheet(plan: RunPlan, file: FactorsFile) -> tuple[list[str], list[list[str]]]:
+    """The comments of the sheet, and its rows, the header first."""
+    comments = [
         SEPARATOR.join(
             ["# design", plan.design.name, *plan.points.traits, *plan.points.generators, f"seed {plan.seed}"]
         )
-        + "\n"
-    )
+    ]
     for factor in file.factors:
+        if factor.levels:
+            comments.append(SEPARATOR.join(["# levels", factor.name, *factor.levels]))
+            continue
         numbers = [written(factor.low), written(factor.high)]
-        stream.write(
-            SEPARATOR.join(["# factor", factor.name, *numbers, factor.unit or "1", written(factor.reference)]) + "\n"
+        comments.append(
+            SEPARATOR.join(["# factor", factor.name, *numbers, factor.unit or "1", written(factor.reference)])
         )
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow([*COLUMNS, *(factor.title for factor in file.factors), *file.responses])
+    own = [*COLUMNS, BLOCK] if len(plan.block) else [*COLUMNS]
+    rows = [[*own, *(factor.title for factor in file.factors), *file.response_titles]]
     natural = region_of(file.factors).natural(plan.coded)
     for position, ((row, replicate), seed) in enumerate(zip(plan.sequence, plan.seeds, strict=True)):
-        levels = [written(value) for value in natural[row]]
-        writer.writerow([row + 1, replicate + 1, position + 1, seed, *levels, *[""] * len(file.responses)])
-    return stream.getvalue()
+        block = [plan.block[position] + 1] if len(plan.block) else []
+        levels = [level_text(factor, value) for factor, value in zip(file.factors, natural[row], strict=True)]
+        answers = plan.finished[position] if position < len(plan.finished) else [""] * len(file.responses)
+        rows.append([*map(str, [row + 1, replicate + 1, position + 1, seed, *block]), *levels, *answers])
+    return comments, rows
+
+
+def level_text(factor: DesignFactor, value: float) -> str:
+    """A level in the factor's unit, or its name."""
+    return factor.levels[int(np.argmin(np.abs(np.array(factor.codes) - value)))] if factor.levels else written(value)
 
 
 def written(value: float) -> str:

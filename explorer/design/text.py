@@ -10,17 +10,26 @@ from typing import Any
 
 import numpy as np
 
+from doe.analysis.mixture import bearable_order, mixture_terms
 from doe.analysis.models import Order, bearable, highest_order, terms_of
 from doe.analysis.power import TermPrecision, precision
+from doe.analysis.surface import Blocks
 from doe.designs import factor_letters
 from doe.record import plain
-from explorer.design.factors_file import FactorsFile, region_of
+from explorer.design.factors_file import DesignFactor, FactorsFile, region_of
 from explorer.design.result import DesignResult
 from explorer.design.run_plan import RunPlan
 from explorer.report.content import Facts, Table
-from explorer.report.design.model import curvature, diagnostics, effect_table, few_terms_table, fit_summary
+from explorer.report.design.model import (
+    curvature,
+    diagnostics,
+    effect_table,
+    few_terms_table,
+    fit_summary,
+    mixture_table,
+)
 from explorer.report.design.sections import factor_table, in_short, settings_table, shape, target
-from explorer.report.sections.surface import anova_table
+from explorer.report.sections.surface import anova_table, variance_table
 from explorer.tables.text_table import text_table
 from explorer.units import enumeration, number
 
@@ -40,9 +49,21 @@ def plan_result(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: f
             for letter, factor in zip(factor_letters(len(file.factors)), file.factors, strict=True)
         ],
         "coded": plan.coded.tolist(),
+        **({"block": (plan.block + 1).tolist()} if len(plan.block) else {}),
         "aliases": list(plan.points.aliases),
-        "model": planned_order(plan),
-        "power": plain(list(_power(plan, sigma, effect))),
+        **({} if plan.points.efficiency is None else _optimal_result(plan)),
+        "model": None if _many_names(file) else planned_order(plan),
+        "power": [] if _many_names(file) else plain(list(_power(plan, sigma, effect))),
+    }
+
+
+def _optimal_result(plan: RunPlan) -> dict[str, Any]:
+    """What an optimal design says of itself, as JSON types."""
+    assert plan.points.efficiency is not None
+    return {
+        "efficiency": plan.points.efficiency.to_dict(),
+        "kept": len(plan.finished),
+        "gained": list(plan.points.gained),
     }
 
 
@@ -55,21 +76,31 @@ def plan_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: flo
         text_table(
             ["", "factor", "low", "high", "unit"],
             [
-                [letter, f.name, number(f.low, 6), number(f.high, 6), f.unit or "1"]
+                [letter, f.name, *([f.levels[0], f.levels[-1], "name"] if f.levels else _range(f))]
                 for letter, f in zip(letters, file.factors, strict=True)
             ],
         ),
         *_beyond(plan, file),
+        *_blocks(plan),
     ]
     if plan.points.aliases:
         lines = "\n".join(plan.points.aliases)
         parts.append(f"aliases (what is on the left also holds what is on the right):\n{lines}")
-    return "\n\n".join([*parts, *plan.points.notes, _power_text(plan, sigma, effect)])
+    return "\n\n".join([*parts, *plan.points.notes, _power_text(plan, file, sigma, effect)])
+
+
+def _many_names(file: FactorsFile) -> bool:
+    """Whether a factor has more names than the polynomials of `doe.analysis` tell apart."""
+    return any(len(factor.levels) > 2 for factor in file.factors)
+
+
+def _range(factor: DesignFactor) -> list[str]:
+    return [number(factor.low, 6), number(factor.high, 6), factor.unit or "1"]
 
 
 def _beyond(plan: RunPlan, file: FactorsFile) -> list[str]:
     """A sentence about runs beyond low … high, which a laboratory may not be able to make."""
-    if np.abs(plan.coded).max() <= 1 + 1e-9:
+    if plan.finished or np.abs(plan.coded).max() <= 1 + 1e-9:
         return []
     natural = region_of(file.factors).natural(plan.coded)
     ends = [
@@ -79,7 +110,20 @@ def _beyond(plan: RunPlan, file: FactorsFile) -> list[str]:
     return [f"The axial runs go beyond low … high: {enumeration(ends)}. --alpha inscribed keeps them within."]
 
 
-def _power_text(plan: RunPlan, sigma: float | None, effect: float | None) -> str:
+def _blocks(plan: RunPlan) -> list[str]:
+    """A sentence about the blocks: their sizes, in the order in which they are run."""
+    if not len(plan.block):
+        return []
+    sizes = ", ".join(map(str, np.bincount(plan.block)))
+    of = "whole replicates" if not len(plan.points.block) else "rows"
+    return [f"Blocks of {of}, of {sizes} runs, one block after the other, shuffled within each."]
+
+
+def _power_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: float | None) -> str:
+    if plan.design.mixture:
+        return _mixture_text(plan)
+    if _many_names(file):
+        return "What it will see is not told for a factor of three names and more."
     found = _power(plan, sigma, effect)
     if not found:
         return (
@@ -106,13 +150,29 @@ def _power_text(plan: RunPlan, sigma: float | None, effect: float | None) -> str
     )
 
 
-def planned_order(plan: RunPlan) -> Order | None:
-    """The model that the runs will bear; None where they leave no error even for the linear one."""
+def _mixture_text(plan: RunPlan) -> str:
+    """Which of Scheffé's polynomials the runs bear."""
     letters = factor_letters(plan.coded.shape[1])
-    values = np.zeros((len(plan.coded), plan.replicates))
-    if plan.design.main_effects_only or not bearable(plan.coded, values, letters, terms_of(letters, "linear")):
-        return "linear" if bearable(plan.coded, values, letters, terms_of(letters, "linear")) else None
-    return highest_order(plan.coded, values, letters)
+    order = bearable_order((plan.coded[plan.sequence[:, 0]] + 1) / 2, letters)
+    if order is None:
+        return "As many blends as terms, or fewer: nothing is left for the error. --replicates 2 or --centre give one."
+    terms = len(mixture_terms(letters, order))
+    df = len(plan.sequence) - terms
+    return f"The runs bear Scheffé's {order} polynomial ({terms} terms), with {df} degrees of freedom for the error."
+
+
+def planned_order(plan: RunPlan) -> Order | None:
+    """The model that the runs bear beside their blocks; None where they leave no error even for the linear one."""
+    letters = factor_letters(plan.coded.shape[1])
+    runs, values = plan.coded[plan.sequence[:, 0]], np.zeros((len(plan.sequence), 1))
+    blocks = None
+    if len(plan.block):
+        names = tuple(str(number + 1) for number in range(plan.block.max() + 1))
+        blocks = Blocks(names, plan.block[:, None])
+    linear = bearable(runs, values, letters, terms_of(letters, "linear"), blocks)
+    if plan.design.main_effects_only or not linear:
+        return "linear" if linear else None
+    return highest_order(runs, values, letters, blocks=blocks)
 
 
 def _power(plan: RunPlan, sigma: float | None, effect: float | None) -> tuple[TermPrecision, ...]:
@@ -122,7 +182,7 @@ def _power(plan: RunPlan, sigma: float | None, effect: float | None) -> tuple[Te
     letters = factor_letters(plan.coded.shape[1])
     runs = plan.coded[plan.sequence[:, 0]]
     # Without a sigma everything is counted in it.
-    return precision(runs, letters, terms_of(letters, order), sigma or 1.0, effect or math.nan)
+    return precision(runs, letters, terms_of(letters, order), sigma or 1.0, effect or math.nan, block=plan.block)
 
 
 def analysis_text(result: DesignResult) -> str:
@@ -137,6 +197,8 @@ def analysis_text(result: DesignResult) -> str:
             parts.append(curvature(effects.curvature, effects.response))
     if found.model is not None:
         parts += [_table(fit_summary(found)), _table(anova_table(found.model.anova))]
+    if found.mixture is not None:
+        parts += [_table(mixture_table(result, found.mixture)), _table(variance_table(found.mixture.rows))]
     told: set[str] = set()
     for section in (in_short(result), diagnostics(result), shape(result), target(result)):
         if section is not None:

@@ -209,12 +209,17 @@ def sheet_result(order: DesignOrder, factors: str, sigma: float | None) -> Comma
         ("--runs", order.runs),
         ("--replicates", order.replicates),
         ("--centre", order.centre),
+        ("--blocks", order.blocks),
+        ("--lattice", order.lattice),
         ("--sigma", sigma),
     )
     for option, number in numbers:
         words += [] if number is None else [option, f"{number:g}"]
     words += ["--fold"] if order.fold else []
+    words += ["--nonregular"] if order.nonregular else []
     words += [word for generator in order.generators for word in ("--generator", generator)]
+    words += [] if order.model is None else ["--model", order.model.value]
+    words += [word for constraint in order.constraints for word in ("--constraint", constraint)]
     return CommandResult(
         plan_text(plan, file, sigma, None), shlex.join(words), {}, {"runs.csv": sheet_text(plan, file).encode()}
     )

@@ -9,6 +9,7 @@ from dataclasses import replace
 from doe.analysis.analyse import DesignAnalysis, FittedModel
 from doe.analysis.contrasts import Curvature
 from doe.analysis.few_terms import FewTermsModel
+from doe.analysis.mixture import Blend, MixtureFit
 from doe.analysis.model_adequacy import BoxCox, Diagnostics
 from doe.analysis.screening import FactorEffect
 from explorer.design.result import DesignResult, DrawnEffects, SheetFactor
@@ -17,13 +18,45 @@ from explorer.report.design.charts import box_cox_profile, single_runs
 from explorer.report.figures.effects import half_normal, main_effects, pareto
 from explorer.report.figures.model import FittedTarget, profiler
 from explorer.report.figures.surface import contours, fit, height_over, residual_quantiles
-from explorer.report.sections.surface import anova_table, equation
-from explorer.units import MISSING, enumeration, fixed, number, observed, p_value, signed
+from explorer.report.sections.surface import anova_table, equation, variance_table
+from explorer.units import MISSING, enumeration, fixed, number, observed, p_value, parameter_value, signed
 
 MOST_ALIASES = 4
 """Effects that share a column and are listed by name."""
 MOST_DRAWN = 40
 """Contrasts in a chart; the table has all."""
+
+
+def mixture(result: DesignResult) -> Section | None:
+    """Scheffé's polynomial of parts that add up to a whole; None for other designs."""
+    found = result.analysis.mixture
+    if found is None:
+        return None
+    text = Text(
+        "The coefficient of a single part is the response where this part has all the room above the lows; that of a "
+        "product says by how much two parts together differ from their mean (a quarter of it in equal shares)."
+    )
+    return Section("Mixture", (text, mixture_table(result, found), variance_table(found.rows)))
+
+
+def mixture_table(result: DesignResult, found: MixtureFit) -> Table:
+    """Coefficients of the polynomial with their errors."""
+    rows = tuple(
+        (term.replace("*", " × "), observed(result.response.path, value), number(error), p_value(p))
+        for term, value, error, p in zip(
+            found.terms, found.coefficients.tolist(), found.standard_errors.tolist(), found.p.tolist(), strict=True
+        )
+    )
+    return Table(("term", "coefficient", "standard error", "p"), rows, f"Scheffé's {found.order} polynomial.")
+
+
+def blend_words(result: DesignResult, blend: Blend) -> str:
+    """A blend and the response there."""
+    parts = [
+        f"{one.name} = {parameter_value(one.path, amount)}"
+        for one, amount in zip(result.factors, blend.amounts.tolist(), strict=True)
+    ]
+    return f"{observed(result.response.path, blend.predicted)} ± {number(blend.standard_error)} at {enumeration(parts)}"
 
 
 def effects(result: DesignResult) -> Section | None:

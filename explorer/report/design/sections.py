@@ -16,7 +16,7 @@ from doe.stages.surface import OptimumResult
 from explorer.design.result import DesignResult
 from explorer.report.content import Banner, Block, Caution, Code, Facts, Figure, Section, Table, Text, Word
 from explorer.report.design.charts import ridge
-from explorer.report.design.model import diagnostics, effects, model, units_of_factors
+from explorer.report.design.model import blend_words, diagnostics, effects, mixture, model, units_of_factors
 from explorer.report.figures.model import cloud, ranges
 from explorer.report.figures.surface import solutions
 from explorer.report.identified import GIVES_TARGET, cloud_caution, rule, settings
@@ -58,6 +58,12 @@ def target(result: DesignResult) -> Section | None:
         ("Reachable in the region", between(found.reachable_low, found.reachable_high)),
         ("Compatible with the target", f"{percent(found.compatible_share)} of the region, at 95 %"),
     ]  # fmt: skip
+    further = result.analysis.at_target
+    if further is not None:
+        facts += [
+            ("One further run there", f"± {number(further.one_run)} about the model, 95 %"),
+            ("95 % of all further runs", f"± {number(further.most_runs)} about the model, with a confidence of 95 %"),
+        ]
     if not found.target_standard_error:
         facts.append(("The target itself", "taken as exact; `--target-error` states its standard error"))
     blocks: list[Block] = [Facts(tuple(facts)), settings_table(result, optimum)]
@@ -211,6 +217,13 @@ def acting_words(result: DesignResult) -> str:
     found = result.analysis
     if found.effects is not None:
         return acting(found.effects.screening)
+    if found.mixture is not None:
+        row = found.mixture.rows[0]
+        return (
+            f"the blend changes the response (p = {p_value(row.p)})"
+            if row.p < 0.05
+            else f"no change by the blend is seen (p = {p_value(row.p)})"
+        )
     return "no model could be fitted" if found.model is None else terms_that_act(found.model.anova)
 
 
@@ -222,6 +235,8 @@ def _acting_names(result: DesignResult) -> list[str]:
         if any(math.isfinite(test.p) for test in tests.values()):
             return [name for name, test in tests.items() if test.p_holm < 0.05]
         return [e.name for e in screening.effects if not e.is_dummy and abs(e.effect) > screening.lenth.margin]
+    if found.mixture is not None:
+        return [factor.factor for factor in result.factors] if found.mixture.rows[0].p < 0.05 else []
     if found.model is None:
         return []
     rows = [row for row in found.model.anova.rows if row.source not in WHOLE]
@@ -260,6 +275,15 @@ def in_short(result: DesignResult) -> Section:
             ("Equation, actual", actual + units_of_factors(result.factors)),
             ("R², adjusted, predicted", ", ".join(fixed(value, 4) for value in r2)),
             ("Scatter of one run", observed(response, anova.sigma)),
+        ]
+    if found.mixture is not None:
+        blends = found.mixture
+        facts += [
+            ("Highest blend", blend_words(result, blends.highest)),
+            ("Lowest blend", blend_words(result, blends.lowest)),
+            ("Looked for", f"over all blends within low … high, in steps of {percent(blends.step)} of the room"),
+            ("R², adjusted, predicted", ", ".join(fixed(value, 4) for value in blends.shares_explained)),
+            ("Scatter of one run", observed(response, blends.sigma)),
         ]
     if found.optimum is not None:
         facts.append(("Target", found.optimum.statement))
@@ -343,6 +367,7 @@ SECTIONS: tuple[Callable[[DesignResult], Section | None], ...] = (
     in_short,
     target,
     effects,
+    mixture,
     model,
     diagnostics,
     shape,

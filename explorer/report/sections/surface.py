@@ -9,7 +9,7 @@ import numpy as np
 
 from doe.analysis.canonical import Canonical
 from doe.analysis.surface import Surface
-from doe.analysis.surface_anova import SurfaceAnova
+from doe.analysis.surface_anova import AnovaRow, SurfaceAnova
 from doe.run_records import sample_of, valid_values
 from doe.stages.ascent import AscentResult
 from doe.stages.surface import SurfaceResult
@@ -115,6 +115,11 @@ def equation(model: Surface, factors: Sequence[Factor], observable: str) -> tupl
 
 def anova_table(anova: SurfaceAnova) -> Table:
     """Analysis of variance as published calibrations print it."""
+    return variance_table(anova.rows, "Partial sums of squares.")
+
+
+def variance_table(sources: Sequence[AnovaRow], caption: str = "One order after the other.") -> Table:
+    """Sources of variation with their tests."""
     rows = tuple(
         (
             row.source.replace("_", " ").replace("*", " × ").replace("^2", "²"),
@@ -124,9 +129,9 @@ def anova_table(anova: SurfaceAnova) -> Table:
             number(row.f),
             p_value(row.p),
         )
-        for row in anova.rows
+        for row in sources
     )
-    return Table(("source", "sum of squares", "df", "mean square", "F", "p"), rows, "Partial sums of squares.")
+    return Table(("source", "sum of squares", "df", "mean square", "F", "p"), rows, caption)
 
 
 def _of_target(place: int, fitted: FittedTarget, canonical: Canonical) -> list[Block]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from doe.designs import DESIGNS
 from doe.table_file import SUFFIXES
 from explorer.design.analysis import AnalyseOrder
+from explorer.design.choices import ModelOrder
 from explorer.design.run_plan import DesignOrder
 from explorer.laboratory.command_results import analysis_result, sheet_result
 from explorer.viewer.laboratory.answer_view import AnswerView
@@ -33,13 +34,35 @@ class DesignPanel(Panel):
             )
             self._replicates = gui.add_number("Runs of each row", 1, min=1, max=1000, step=1)
             self._size = gui.add_number(
-                "Size", 0, min=0, max=20_000, step=1, hint="plackett-burman: 8 … 48; lhs, sobol: points; 0: as usual."
+                "Size",
+                0,
+                min=0,
+                max=20_000,
+                step=1,
+                hint="Rows of a table or fraction, or points; 0: as usual.",
+            )
+            self._blocks = gui.add_number(
+                "Blocks",
+                0,
+                min=0,
+                max=512,
+                step=1,
+                hint="Days or batches, clear of the model's effects; 0: none.",
+            )
+            self._nonregular = gui.add_checkbox(
+                "Nonregular", False, hint="plackett-burman, 16 and 32 runs: no main effect is wholly an interaction."
             )
             self._fold = gui.add_checkbox(
                 "Fold over", False, hint="plackett-burman: the mirror image of every row too, which frees main effects."
             )
             self._generators = gui.add_text(
                 "Generators", "", hint="factorial: a fraction, as E=ABC; several with spaces between."
+            )
+            self._model = gui.add_dropdown(
+                "Model", tuple(one.value for one in ModelOrder), initial_value="quadratic", hint="Whose terms are told."
+            )
+            self._constraints = gui.add_text(
+                "Constraints", "", hint="In the factors' units, as A + B <= 1; several with ; between."
             )
             self._sigma = gui.add_number(
                 "Standard deviation of a run", 0.0, min=0.0, hint="In the response's unit; 0: unknown. For the power."
@@ -69,7 +92,16 @@ class DesignPanel(Panel):
     def _follow(self) -> None:
         """Ask for what the chosen kind of design takes."""
         kind = DESIGNS.get(str(self._kind.value))
-        for name, handle in {"runs": self._size, "fold": self._fold, "generators": self._generators}.items():
+        fields = {
+            "runs": self._size,
+            "blocks": self._blocks,
+            "nonregular": self._nonregular,
+            "fold": self._fold,
+            "generators": self._generators,
+            "model": self._model,
+            "constraints": self._constraints,
+        }
+        for name, handle in fields.items():
             handle.visible = kind is not None and name in kind.options
 
     def _make(self) -> None:
@@ -79,6 +111,12 @@ class DesignPanel(Panel):
             replicates=int(self._replicates.value),
             fold=self._fold.visible and bool(self._fold.value),
             generators=tuple(str(self._generators.value).split()) if self._generators.visible else (),
+            blocks=(int(self._blocks.value) or None) if self._blocks.visible else None,
+            nonregular=self._nonregular.visible and bool(self._nonregular.value),
+            model=ModelOrder(self._model.value) if self._model.visible else None,
+            constraints=tuple(one.strip() for one in str(self._constraints.value).split(";") if one.strip())
+            if self._constraints.visible
+            else (),
         )
         factors = self._factors.chosen
         known = positive(self._sigma.value)

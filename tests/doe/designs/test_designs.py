@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from doe.analysis.surface import second_order_terms
-from doe.designs import box_behnken, fold_over, interaction_aliases, plackett_burman
-from doe.designs.plackett_burman import interaction_overlap, smallest_size
+from doe.designs import DESIGNS, DesignOptions, box_behnken, fold_over, interaction_aliases, plackett_burman
+from doe.designs.plackett_burman import MOST_NONREGULAR, interaction_overlap, nonregular_table, smallest_size
 from doe.errors import StatisticsError
 
 # Rows 1, 10, 19 and 28 as R's FrF2 prints them: [A B C], [C A B], [B C A], all minus.
@@ -78,6 +78,56 @@ def test_plackett_burman_40_is_the_20_run_table_doubled():
     assert np.array_equal(table[20:, :19], half)
     assert np.array_equal(table[:20, 19:38], -half)
     assert (table[-1] == -1).all()
+
+
+@pytest.mark.parametrize("runs, factors, share", [(16, 14, 1 / 2), (32, 31, 1 / 4)])
+def test_a_nonregular_table_is_orthogonal_and_no_main_effect_is_an_interaction(runs, factors, share):
+    """The regular table of the same size holds whole interactions: shares of 0 and ±1 alone."""
+    table = nonregular_table(runs)
+    assert factors == MOST_NONREGULAR[runs]
+    assert np.array_equal(table.T @ table, runs * np.eye(runs - 1))
+    assert not table.sum(axis=0).any()
+    shares, _ = interaction_aliases(table[:, :factors])
+    assert set(np.unique(np.abs(shares))) == {0, share}
+    regular, _ = interaction_aliases(plackett_burman(runs)[:, :factors])
+    assert set(np.unique(np.abs(regular))) == {0, 1}
+
+
+def test_every_three_factors_of_the_nonregular_16_are_seen_in_all_combinations():
+    """Projectivity 3 (Box and Tyssedal 1996); with up to 8 factors no two interactions are the same either (as in the
+    designs of Jones and Montgomery 2010).
+    """
+    table = nonregular_table(16)[:, :14]
+    assert all(len(np.unique(table[:, [i, j, k]], axis=0)) == 8
+               for i in range(14) for j in range(i) for k in range(j))  # fmt: skip
+    assert interaction_overlap(table[:, :8]) < 1
+    # The fifteenth column tells the halves of the doubled table apart, and is seven interactions wholly.
+    shares, _ = interaction_aliases(nonregular_table(16))
+    assert (np.abs(shares[14]) == 1).sum() == 7
+
+
+def test_a_regular_table_says_that_it_confuses_and_names_the_better_one():
+    regular = DESIGNS["plackett-burman"].points(12, DesignOptions(runs=16))
+    assert "--nonregular gives as many runs in which none is" in regular.notes[0]
+    better = DESIGNS["plackett-burman"].points(12, DesignOptions(nonregular=True))
+    assert better.notes == ()
+    assert (len(better.coded), better.unused.shape[1]) == (16, 3)
+    assert "no other table of 8 runs is better" in DESIGNS["plackett-burman"].points(7, DesignOptions()).notes[0]
+    assert len(DESIGNS["plackett-burman"].points(15, DesignOptions(nonregular=True)).coded) == 32
+    assert DESIGNS["plackett-burman"].points(11, DesignOptions()).notes == ()
+
+
+@pytest.mark.parametrize(
+    "factors, runs, message",
+    [
+        (7, 8, "every table of 8 runs is a regular fraction; allowed: 16 and 32"),
+        (7, 20, "no such table of 20 runs; allowed"),
+        (15, 16, "has 14 columns for 15 factors; allowed: at least 32"),
+    ],
+)
+def test_a_nonregular_table_that_there_is_not_is_refused(factors, runs, message):
+    with pytest.raises(StatisticsError, match=message):
+        DESIGNS["plackett-burman"].points(factors, DesignOptions(runs=runs, nonregular=True))
 
 
 @pytest.mark.parametrize("runs", [4, 10, 27, 52])

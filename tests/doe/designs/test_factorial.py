@@ -1,16 +1,22 @@
 """Two-level factorials and their fractions against the tables of the textbooks."""
 
+from itertools import combinations
+from math import comb
+
 import numpy as np
 import pytest
 
+from doe.designs import DESIGNS, DesignOptions
 from doe.designs.factorial import (
     STANDARD_FRACTIONS,
     alias_chains,
     defining_relation,
+    factor_columns,
     factor_letters,
     factorial,
     generator_words,
     standard_generators,
+    word_lengths,
 )
 from doe.errors import StatisticsError
 
@@ -93,12 +99,127 @@ def test_listed_fractions_are_what_their_aliases_say(factors, removed):
         (7, 4, 3),
         (8, 2, 5),
         (8, 4, 4),
+        (9, 3, 4),
+        (9, 4, 4),
+        (9, 5, 3),
+        (10, 4, 4),
+        (10, 5, 4),
+        (11, 5, 4),
+        (11, 6, 4),
+        (15, 9, 4),
+        (15, 10, 4),
+        (15, 11, 3),
     ],
 )
 def test_listed_fractions_have_the_published_resolution(factors, removed, resolution):
-    """Box, Hunter and Hunter 2005, table 6.22."""
+    """Box, Hunter and Hunter 2005, table 6.22, up to 11 factors; NIST's handbook, section 5.3.3.4.7, the others."""
     relation = defining_relation(words(factors, standard_generators(factors, removed)))
     assert len(relation[0].factors) == resolution
+
+
+@pytest.mark.parametrize(
+    "runs, factors, lengths",
+    [
+        (16, 9, (4, 14, 8)),
+        (16, 10, (8, 18, 16)),
+        (16, 11, (12, 26, 28)),
+        (16, 12, (16, 39, 48)),
+        (16, 13, (22, 55, 72)),
+        (16, 14, (28, 77, 112)),
+        (16, 15, (35, 105, 168)),
+        (32, 8, (0, 3, 4)),
+        (32, 9, (0, 6, 8)),
+        (32, 10, (0, 10, 16)),
+        (32, 11, (0, 25, 0)),
+        (32, 12, (0, 38, 0)),
+        (32, 13, (0, 55, 0)),
+        (32, 14, (0, 77, 0)),
+        (32, 15, (0, 105, 0)),
+        (64, 8, (0, 0, 2)),
+        (64, 9, (0, 1, 4)),
+        (64, 10, (0, 2, 8)),
+        (64, 11, (0, 4, 14)),
+        (64, 12, (0, 6, 24)),
+        (64, 13, (0, 14, 28)),
+        (64, 14, (0, 22, 40)),
+        (64, 15, (0, 30, 60)),
+    ],
+)
+def test_listed_fractions_have_the_catalogued_word_lengths(runs, factors, lengths):
+    """Words of length 3, 4 and 5: Chen, Sun and Wu 1993, Int. Stat. Rev. 61:131."""
+    generators = standard_generators(factors, factors - runs.bit_length() + 1)
+    assert word_lengths(words(factors, generators), factors)[:5] == (0, 0, *lengths)
+
+
+@pytest.mark.parametrize(
+    "basic, factors", [(3, 5), (3, 6), (3, 7), *((4, k) for k in range(5, 16)), *((5, k) for k in range(6, 10))]
+)
+def test_no_other_fraction_of_the_size_has_less_aberration(basic, factors):
+    """Every choice of columns, its word lengths by MacWilliams' identity from how many factors are low in each run:
+    A_i is the mean over the runs of the Krawtchouk polynomial K_i.
+    """
+    runs = np.arange(2**basic)
+    low = np.array([[(run & column).bit_count() % 2 for column in range(2**basic)] for run in runs])
+    ours = list(factor_columns(factors, standard_generators(factors, factors - basic)))
+    free = [column for column in range(1, 2**basic) if column.bit_count() > 1]
+    own = [1 << k for k in range(basic)]
+    chosen = np.array([ours, *([*own, *more] for more in combinations(free, factors - basic))])
+    weights = low[:, chosen].sum(axis=2)
+    krawtchouk = np.array([
+        [sum((-1) ** j * comb(w, j) * comb(factors - w, i - j) for j in range(i + 1)) for w in range(factors + 1)]
+        for i in range(1, factors + 1)
+    ])  # fmt: skip
+    lengths = krawtchouk[:, weights].sum(axis=1).T // 2**basic
+    assert tuple(lengths[0]) == word_lengths(words(factors, standard_generators(factors, factors - basic)), factors)
+    assert tuple(lengths[0]) == min(map(tuple, lengths))
+
+
+@pytest.mark.parametrize("factors", range(10, 16))
+def test_no_fraction_of_32_runs_without_words_of_three_has_fewer_of_four(factors):
+    """Every choice of columns by rising number, left where it makes a word of three, or too many words of four."""
+    found = word_lengths(words(factors, standard_generators(factors, factors - 5)), factors)
+    free = [column for column in range(32) if column.bit_count() > 2]
+    fewest = found[3] + 1
+
+    def extend(columns, candidates, four):
+        nonlocal fewest
+        if len(columns) == factors:
+            fewest = min(fewest, four)
+        twos = {a ^ b for a, b in combinations(columns, 2)}
+        threes = [a ^ b ^ c for a, b, c in combinations(columns, 3)]
+        for k in range(len(candidates) - (factors - len(columns)) + 1) if len(columns) < factors else ():
+            total = four + threes.count(candidates[k])
+            if candidates[k] not in twos and total < fewest:
+                extend([*columns, candidates[k]], candidates[k + 1 :], total)
+
+    extend([1 << k for k in range(5)], free, 0)
+    assert (found[:3], found[3]) == ((0, 0, 0), fewest)
+
+
+def test_a_size_takes_the_fraction_of_least_aberration():
+    factorial_design = DESIGNS["factorial"]
+    points = factorial_design.points(11, DesignOptions(runs=32))
+    assert (points.coded.shape, points.traits) == ((32, 11), ("2^(11−6)",))
+    assert points.notes[0].startswith("Resolution IV; words of the defining relation: 25 of length 4, 27 of length 6")
+    assert np.array_equal(points.coded, factorial_design.points(11, DesignOptions(fraction=6)).coded)
+    assert factorial_design.points(4, DesignOptions(runs=16)).generators == ()
+    # Half of any factorial: the last factor is the product of all others.
+    assert factorial_design.points(10, DesignOptions(runs=512)).aliases[0] == "I = ABCDEFGHJK"
+    assert factorial_design.points(15, DesignOptions(runs=16)).aliases[0].endswith("and 2016 more")
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ({"runs": 24}, "runs = 24: no listed factorial of 9 factors; allowed: 16, 32, 64, 256, 512"),
+        ({"runs": 8}, "allowed: 16, 32"),
+        ({"runs": 32, "fraction": 4}, "runs: has generators of its own; allowed: runs or fraction"),
+        ({"fraction": 2}, r"no listed fraction 2\^\(9-2\); listed: 9-1 \(256 runs\), 9-3 \(64 runs\)"),
+    ],
+)
+def test_a_size_that_is_not_listed_is_refused_with_what_is(options, message):
+    with pytest.raises(StatisticsError, match=message):
+        DESIGNS["factorial"].points(9, DesignOptions(**options))
 
 
 @pytest.mark.parametrize(
@@ -121,8 +242,8 @@ def test_a_generator_that_makes_no_column_is_refused(generators, message):
 def test_too_large_a_factorial_and_an_unlisted_fraction_are_refused():
     with pytest.raises(StatisticsError, match="allowed are 1 to 10"):
         factorial(11)
-    with pytest.raises(StatisticsError, match=r"no listed fraction 2\^\(9-5\)"):
-        standard_generators(9, 5)
+    with pytest.raises(StatisticsError, match=r"no listed fraction 2\^\(9-6\)"):
+        standard_generators(9, 6)
 
 
 def test_letters_leave_out_the_identity_and_go_on_after_z():

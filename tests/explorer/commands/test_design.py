@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 
+from explorer.design.filled_sheet import read_sheet
 from solver.assets import asset_path
 from tests.explorer.command_line import explorer, refused
 
@@ -179,6 +180,192 @@ def test_fraction_prints_its_defining_relation_and_alias_chains(tmp_path):
     assert "AE = BC = DF" in said
 
 
+def test_days_that_differ_take_nothing_from_the_model(tmp_path, process):
+    """A surface with a shift of 7 from day to day: the coefficients are the planted ones, and the days add up to 0."""
+    path, said = made(tmp_path, "central-composite", "--factors", process, "--blocks", 2, "--seed", 4)
+    assert "Blocks of rows, of 7, 7 runs" in said
+    assert f"explorer analyse {path} --block block" in said
+    lines = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    day, x1, x2 = np.array([[float(one[4]), (float(one[5]) - 85) / 5, (float(one[6]) - 175) / 5] for one in lines]).T
+    noise = 1e-3 * np.random.default_rng(3).standard_normal(len(lines))
+    filled = fill(path, 80 + x1 - 2 * x2 + 3 * x1 * x2 - 1.4 * x1**2 + 7 * day + noise)
+    surface = analysed(filled, "--block", "block")["analysis"]["model"]["surface"]
+    assert surface["coefficients"] == pytest.approx([90.5, 1, -2, 3, -1.4, 0], abs=0.01)
+    assert surface["block_effects"] == pytest.approx([-3.5, 3.5], abs=0.01)
+    # Without a name the column is no response, and is pointed at.
+    assert "Not used: block." in explorer("analyse", filled).stdout
+
+
+SOLVENT = """
+[[factor]]
+name = "solvent"
+levels = ["water", "ethanol"]
+"""
+
+
+def test_an_optimal_design_stays_within_constraints_in_the_factors_units(tmp_path, process):
+    process.write_text(PROCESS + SOLVENT, encoding="utf-8")
+    limits = ("--constraint", "time + temperature <= 265", "--constraint", "A >= 2*B - 266")
+    path, said = made(tmp_path, "i-optimal", "--factors", process, "--runs", 12, *limits, "--model", "quadratic")
+    assert "i-optimal, quadratic model of 9 terms: 12 rows × 1 = 12 runs" in said
+    assert "D-efficiency" in said
+    lines = path.read_text(encoding="utf-8").splitlines()
+    assert "# levels | solvent | water | ethanol" in lines
+    runs = [line.split(",")[4:7] for line in lines if line[0].isdigit()]
+    time, temperature = np.array([[float(one[0]), float(one[1])] for one in runs]).T
+    assert (time + temperature <= 265 + 1e-6).all()
+    assert (time >= 2 * temperature - 266 - 1e-6).all()
+    assert {one[2] for one in runs} == {"water", "ethanol"}
+
+
+def test_runs_are_added_to_a_finished_sheet_for_what_it_could_not_tell(tmp_path):
+    """A half fraction with C = AB, four of eight runs filled: the added runs make a main effect of C again."""
+    factors = many_factors(tmp_path, 3)
+    path, _ = made(tmp_path, "factorial", "--factors", factors, "--generator", "C=AB", "--replicates", 2,
+                   "--standard-order")  # fmt: skip
+    fill(path, (1.5, 2.5, 3.5, 4.5))
+    out = tmp_path / "more.csv"
+    order = ("design", "d-optimal", "--factors", factors, "--augment", path, "--runs", 4, "--model", "interactions")
+    result = explorer(*order, "--out", out, "--json")
+    assert result.exit_code == 0, result.output
+    said = json.loads(result.stdout)
+    assert said["gained"] == ["A", "B", "C", "A*B", "A*C", "B*C"]
+    assert (said["kept"], said["runs"], said["efficiency"]["d"]) == (4, 8, pytest.approx(100))
+    lines = [line.split(",") for line in out.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    assert [line[-1] for line in lines] == ["1.5", "2.5", "3.5", "4.5", "", "", "", ""]
+    assert len({tuple(line[4:7]) for line in lines}) == 8
+    again = explorer(*order, "--out", tmp_path / "again.csv")
+    assert "The 4 finished runs could not tell apart A, B, C, A*B, A*C, B*C; with the 4 added runs" in again.stdout
+    assert "allowed: --replicates 1" in refused(explorer(*order, "--replicates", 2, "--out", tmp_path / "x.csv"))
+    explorer("design", "factorial", "--factors", factors, "--out", tmp_path / "empty.csv")
+    empty = ("design", "d-optimal", "--factors", factors, "--augment", tmp_path / "empty.csv")
+    assert "no run with a result in response" in refused(explorer(*empty, "--out", tmp_path / "x.csv"))
+
+
+def test_a_factor_of_two_names_is_analysed_by_its_name(tmp_path, process):
+    """y = 10 + time's 2 and solvent's 3 either way of the mean: ethanol, the second name, is +1."""
+    process.write_text(PROCESS + SOLVENT, encoding="utf-8")
+    path, _ = made(tmp_path, "factorial", "--factors", process, "--replicates", 2)
+    runs = [line.split(",")[4:7] for line in path.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    noise = np.random.default_rng(5).standard_normal(len(runs)) / 100
+    values = [10 + 2 * (float(a) - 85) / 5 + (3 if c == "ethanol" else -3) for a, _, c in runs]
+    result = analysed(fill(path, np.array(values) + noise))
+    found = dict(zip(result["analysis"]["model"]["surface"]["terms"],
+                     result["analysis"]["model"]["surface"]["coefficients"], strict=True))  # fmt: skip
+    assert [found[term] for term in ("intercept", "A", "B", "C")] == pytest.approx([10, 2, 0, 3], abs=0.02)
+    assert "solvent: −1 is water, +1 is ethanol." in result["analysis"]["notes"]
+    assert "--target: solvent is no number" in refused(explorer("analyse", path, "--target", 12))
+    path.write_text(path.read_text(encoding="utf-8").replace("ethanol,", "Ethanol,", 1), encoding="utf-8")
+    assert "column solvent: 'Ethanol'; allowed: water, ethanol" in refused(explorer("analyse", path))
+
+
+def test_a_factor_of_three_names_is_analysed_as_blocks(tmp_path, process):
+    process.write_text(PROCESS + SOLVENT.replace('"ethanol"', '"ethanol", "oil"'), encoding="utf-8")
+    path, said = made(tmp_path, "d-optimal", "--factors", process, "--model", "linear", "--runs", 12)
+    assert "not told for a factor of three names" in said
+    fill(path, np.random.default_rng(1).standard_normal(12))
+    message = refused(explorer("analyse", path))
+    assert "solvent has 3 levels that are no numbers; allowed: " in message
+    assert "--only time,temperature --block solvent" in message
+    result = analysed(path, "--only", "time,temperature", "--block", "solvent")
+    assert set(result["analysis"]["model"]["surface"]["block_names"]) == {"water", "ethanol", "oil"}
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        (("--constraint", "time < 3"), "--constraint 'time < 3': allowed: a form such as"),
+        (("--constraint", "time + heat <= 3"), "cannot read '+ heat'"),
+        (("--constraint", "time temperature <= 3"), "cannot read 'temperature'"),
+        (("--constraint", "2* <= time"), "cannot read '*'"),
+        (("--constraint", "3 <= 4"), "names no factor"),
+        (("--constraint", "solvent <= 1"), "solvent is no number"),
+        (("--constraint", "time + temperature <= 20"), "allowed: a wider region"),
+        (("--runs", 5), "runs = 5: too few for the 9 terms of the quadratic model; allowed: at least 9"),
+        (("--augment", "nowhere.csv"), "nowhere.csv"),
+    ],
+)
+def test_bad_orders_of_an_optimal_design_get_one_line(tmp_path, process, options, message):
+    process.write_text(PROCESS + SOLVENT, encoding="utf-8")
+    out = tmp_path / "runs.csv"
+    assert message in refused(explorer("design", "d-optimal", "--factors", process, *options, "--out", out))
+    assert not out.exists()
+
+
+def test_names_are_for_designs_that_run_them(tmp_path, process):
+    process.write_text(PROCESS + SOLVENT, encoding="utf-8")
+    order = ("design", "central-composite", "--factors", process, "--out", tmp_path / "runs.csv")
+    assert "runs solvent between or beyond its levels water, ethanol" in refused(explorer(*order))
+    other = ("design", "factorial", "--factors", process, "--model", "linear", "--out", tmp_path / "runs.csv")
+    assert "--model: is not for factorial; it belongs to d-optimal, i-optimal" in refused(explorer(*other))
+
+
+def test_a_mixture_goes_from_its_parts_to_the_best_blend(tmp_path):
+    """A whole of 100, 20 of water at least: y = 3 a + 5 b + 1 w + 8 a b of the shares above the lows."""
+    factors = tmp_path / "parts.toml"
+    parts = {"ash": (0, 80), "binder": (0, 80), "water": (20, 100)}
+    entries = (
+        f'[[factor]]\nname = "{name}"\nlow = {low}\nhigh = {high}\nunit = "%"\n' for name, (low, high) in parts.items()
+    )
+    factors.write_text("".join(entries), encoding="utf-8")
+    path, said = made(tmp_path, "mixture", "--factors", factors, "--replicates", 2, "--centre", 1)
+    assert "simplex centroid: 8 rows × 2 = 16 runs" in said
+    assert "special cubic polynomial (7 terms), with 9 degrees of freedom" in said
+    runs = [
+        [float(cell) for cell in line.split(",")[4:7]] for line in path.read_text().splitlines() if line[0].isdigit()
+    ]
+    assert np.allclose(np.sum(runs, axis=1), 100)
+    a, b, w = ((np.array(runs) - [0, 0, 20]) / 80).T
+    noise = np.random.default_rng(2).standard_normal(16) / 1000
+    result = analysed(fill(path, 3 * a + 5 * b + w + 8 * a * b + noise), "--model", "quadratic")
+    found = result["analysis"]["mixture"]
+    assert found["terms"] == ["A", "B", "C", "A*B", "A*C", "B*C"]
+    assert found["coefficients"] == pytest.approx([3, 5, 1, 8, 0, 0], abs=0.02)
+    # On the edge of ash and binder: b = 1/2 + 2/16.
+    assert found["highest"]["amounts"] == pytest.approx([30, 50, 20], abs=0.8)
+    out = tmp_path / "report"
+    assert explorer("analyse", path, "--out", out).exit_code == 0
+    text = (out / "report.md").read_text(encoding="utf-8")
+    assert "Scheffé's special cubic polynomial" in text
+    assert "Highest blend" in text
+    assert "--target: is not for a mixture" in refused(explorer("analyse", path, "--target", 3))
+
+
+def test_parts_whose_ranges_cannot_be_one_whole_are_refused(tmp_path, process):
+    order = ("design", "mixture", "--factors", process, "--out", tmp_path / "x.csv")
+    process.write_text(PROCESS.replace("170", "175"), encoding="utf-8")
+    assert "high less low is not the same for every part (time 10, temperature 5)" in refused(explorer(*order))
+    many = ("design", "lhs", "--factors", process, "--lattice", 2, "--out", tmp_path / "x.csv")
+    assert "--lattice: is not for lhs; it belongs to mixture" in refused(explorer(*many))
+
+
+def test_a_reduced_model_says_what_was_dropped_and_that_its_p_are_too_small(tmp_path):
+    full, reduced = analysed("sunflower_extract"), analysed("sunflower_extract", "--reduce", "p")
+    assert "reduced" not in full["analysis"]
+    found = reduced["analysis"]["reduced"]
+    surface = reduced["analysis"]["model"]["surface"]
+    left = [term for term, is_in in zip(surface["terms"], surface["included"], strict=True) if is_in][1:]
+    assert sorted(left + found["dropped"]) == sorted(surface["terms"][1:])
+    assert found["dropped"]
+    text = explorer("analyse", "sunflower_extract", "--reduce", "aicc", "--target", 24.68).stdout
+    assert "Reduced by AICc, one term after the other" in text
+    assert "take no account of this search and are too small" in text
+    out = tmp_path / "report"
+    assert explorer("analyse", "sunflower_extract", "--reduce", "aicc", "--out", out).exit_code == 0
+    assert "explorer analyse sunflower_extract --reduce aicc" in (out / "report.md").read_text(encoding="utf-8")
+
+
+def test_further_runs_at_the_target_have_their_own_intervals(tmp_path):
+    """Wider than that of the mean, by the scatter of a run; most runs wider than one."""
+    result = analysed("sunflower_extract", "--target", 24.68)["analysis"]
+    one, most = result["at_target"]["one_run"], result["at_target"]["most_runs"]
+    mean = (result["optimum"]["predicted_high"] - result["optimum"]["predicted_low"]) / 2
+    sigma = result["model"]["anova"]["sigma"]
+    assert mean < one < most
+    assert one > sigma
+    assert "One further run there: ± " in explorer("analyse", "sunflower_extract", "--target", 24.68).stdout
+
+
 def test_power_is_in_the_plain_data(tmp_path, process):
     result = explorer("design", "factorial", "--factors", process, "--replicates", 4, "--sigma", 2, "--effect", 3,
                       "--out", tmp_path / "runs.csv", "--json")  # fmt: skip
@@ -214,6 +401,48 @@ def test_bad_orders_of_a_design_leave_no_file(tmp_path, arguments, message):
     out = tmp_path / "runs.csv"
     assert message in refused(explorer(*arguments, "--out", out))
     assert not out.exists()
+
+
+def test_a_workbook_and_a_sheet_with_decimal_commas_hold_the_same_runs(tmp_path, process):
+    """Read back by the table reader, and the numbers of the workbook as numbers by openpyxl."""
+    import openpyxl
+
+    process.write_text(PROCESS.replace('"yield"', '"yield [%]"').replace("80", "80.5") + SOLVENT, encoding="utf-8")
+    names = {"a.csv": (), "b.csv": ("--decimal-comma",), "c.xlsx": ()}
+    sheets = {}
+    for name, options in names.items():
+        order = ("design", "factorial", "--factors", process, *options, "--out", tmp_path / name)
+        assert explorer(*order).exit_code == 0
+        sheet = read_sheet(tmp_path / name)
+        levels = [[sheet.level(k, factor) for factor in sheet.factors] for k in range(len(sheet.cells))]
+        sheets[name] = (sheet.factors, sheet.units, levels)
+        assert sheet.responses == ["yield"]
+        assert sheet.units["yield"] == "%"
+    assert sheets["a.csv"] == sheets["b.csv"] == sheets["c.xlsx"]
+    text = (tmp_path / "b.csv").read_bytes().decode("utf-8")
+    assert text.startswith("\ufeff# design")
+    assert "row;replicate;run;seed;time [min];temperature [°F];solvent;yield [%]" in text
+    assert ";80,5;" in text
+    page = openpyxl.load_workbook(tmp_path / "c.xlsx").active
+    time = [row[4] for row in page.iter_rows(min_row=6, values_only=True)]
+    assert set(time) == {80.5, 90.0}
+    both = ("design", "factorial", "--factors", process, "--decimal-comma", "--out", tmp_path / "d.xlsx")
+    assert "is a workbook" in refused(explorer(*both))
+
+
+def test_a_workbook_is_analysed_as_the_sheet_is(tmp_path):
+    import openpyxl
+
+    factors = many_factors(tmp_path, 4)
+    made_sheet, _ = made(tmp_path, "factorial", "--factors", factors, "--standard-order")
+    book_file = tmp_path / "runs.xlsx"
+    explorer("design", "factorial", "--factors", factors, "--standard-order", "--out", book_file)
+    book = openpyxl.load_workbook(book_file)
+    for row, value in zip(book.active.iter_rows(min_row=7), FILTRATION_RATE, strict=True):
+        row[-1].value = value
+    book.save(book_file)
+    by_book, by_sheet = analysed(book_file), analysed(fill(made_sheet, FILTRATION_RATE))
+    assert by_book["analysis"] == by_sheet["analysis"]
 
 
 def test_a_sheet_is_not_written_over(tmp_path):

@@ -77,6 +77,7 @@ def filled(text, values):
         DesignOrder("factorial", generators=("C=AB",), replicates=3),
         DesignOrder("lhs", runs=12),
         DesignOrder("sobol", runs=16),
+        DesignOrder("central-composite", blocks=3),
     ],
     ids=lambda order: order.design,
 )
@@ -84,7 +85,8 @@ def test_a_design_is_read_from_its_sheet_as_it_was_made(tmp_path, order):
     file = read_factors(factors_file(tmp_path))
     plan = make_plan(order, file)
     values = np.arange(len(plan.sequence)) + 0.25
-    runs = runs_of(read_sheet(sheet_file(tmp_path, filled(sheet_text(plan, file), values))), "strength")
+    text = filled(sheet_text(plan, file), values)
+    runs = runs_of(read_sheet(sheet_file(tmp_path, text)), "strength", block="block" if order.blocks else "")
     assert runs.design == order.design
     assert runs.factors == file.factors
     assert runs.coded == pytest.approx(plan.coded, abs=1e-9)  # twelve digits of a level
@@ -244,7 +246,11 @@ def test_a_response_that_would_be_markup_is_refused(tmp_path):
         ("low = 0.1", "low = 0.3", r"factor\[2\].high: 0.3 is not above low 0.3"),
         ("low = 0.1", 'low = "0.1"', r"factor\[2\].low: '0.1' is not a number"),
         ("low = 0.1", "lower = 0.1", r"factor\[2\].lower: unknown key"),
+        ('"strength"', '"strength [M|a]"', r"responses: unit of 'strength \[M\|a\]'; allowed"),
         ("low = 0.1", "", r"factor\[2\].low: missing"),
+        ("low = 0.1", 'levels = ["a"]\nlow = 0.1', r"factor\[2\].low: 0.1 beside levels \(time\); allowed: one"),
+        ("low = 0.1\nhigh = 0.3", 'levels = ["a"]', r"factor\[2\].levels: \['a'\]; allowed: two or more different"),
+        ("low = 0.1\nhigh = 0.3", 'levels = ["a", "7"]', r"factor\[2\].levels: '7'; allowed: names"),
         ('unit = "°C"', 'unit = "a|b"', r"factor\[1\].unit: 'a\|b'"),
         ("high = 180", "high = inf", r"factor\[1\].high: inf is not a number"),
         ('responses = ["strength", "slump"]', "responses = []", "responses: "),
@@ -272,11 +278,40 @@ def test_a_bad_factors_file_gets_one_line_with_its_key(tmp_path, old, new, messa
         (DesignOrder("factorial", alpha=Alpha.INSCRIBED), "--alpha: is not for factorial"),
         (DesignOrder("lhs", runs=30_000), "--runs 30000: allowed"),
         (DesignOrder("factorial", replicates=9000), "allowed are 20000 runs"),
+        (DesignOrder("lhs", blocks=2), "--blocks: is not for lhs; it belongs to .*, or 2 replicates of any design"),
+        (DesignOrder("box-behnken", blocks=2), "none that are orthogonal; or .* --replicates 2 --blocks 2"),
+        (DesignOrder("factorial", nonregular=True), "--nonregular: is not for factorial"),
     ],
 )
 def test_an_option_of_another_design_is_refused(tmp_path, order, message):
     with pytest.raises((CommandError, StatisticsError), match=message):
         make_plan(order, read_factors(factors_file(tmp_path)))
+
+
+def test_runs_of_a_block_stand_together_and_are_shuffled_within(tmp_path):
+    file = read_factors(factors_file(tmp_path))
+    plan = make_plan(DesignOrder("factorial", blocks=2, replicates=3), file)
+    assert plan.block.tolist() == [0] * 12 + [1] * 12
+    product = plan.coded[plan.sequence[:, 0]].prod(axis=1)
+    assert (product[:12] == -product[12:]).all()
+    assert not np.array_equal(plan.sequence[:12, 0], np.sort(plan.sequence[:12, 0]))
+    header, first = [line for line in sheet_text(plan, file).splitlines() if line[0] != "#"][:2]
+    assert header.startswith("row,replicate,run,seed,block,")
+    assert first.split(",")[4] == "1"
+
+
+def test_blocks_of_whole_replicates_hold_every_row_of_any_design(tmp_path):
+    plan = make_plan(DesignOrder("box-behnken", blocks=2, replicates=4), read_factors(factors_file(tmp_path)))
+    for block in (0, 1):
+        rows = plan.sequence[plan.block == block, 0]
+        assert np.array_equal(np.bincount(rows), np.full(17, 2))
+
+
+def test_a_factor_called_block_is_refused_where_there_are_blocks(tmp_path):
+    file = read_factors(factors_file(tmp_path, FACTORS.replace('"strength"', '"block"')))
+    assert len(make_plan(DesignOrder("factorial"), file).block) == 0
+    with pytest.raises(CommandError, match="the sheet's column 'block' is a name of the factors file"):
+        make_plan(DesignOrder("factorial", blocks=2), file)
 
 
 def test_a_table_with_too_few_columns_is_refused(tmp_path):

@@ -84,12 +84,15 @@ def test_factors_that_nothing_tells_apart_are_named(tmp_path, change, said):
         analysed(tmp_path, runs)
 
 
-def test_a_mixture_is_called_one(tmp_path):
-    head = "# factor | a | 0 | 1\n# factor | b | 0 | 1\n# factor | c | 0 | 1\na,b,c,y\n"
+def test_a_mixture_beside_another_factor_is_called_one(tmp_path):
+    parts = "# factor | a | 0 | 1\n# factor | b | 0 | 1\n# factor | c | 0 | 1\n"
+    head = parts + "a,b,c,y\n"
     blends = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.5, 0.5, 0), (0.5, 0, 0.5), (0, 0.5, 0.5), (1 / 3, 1 / 3, 1 / 3)]
     runs = "".join(f"{a:.12g},{b:.12g},{c:.12g},{5 + a + 2 * b}\n" for a, b, c in blends)
-    with pytest.raises(CommandError, match=r"a, b and c add up to 1 in every run: a mixture, .* --only a,b$"):
-        analysed(tmp_path, runs, head)
+    heat = "".join(f"{line},{k % 2}\n" for k, line in enumerate(runs.split()))
+    with pytest.raises(CommandError, match=r"a, b and c add up to 1 in every run: a mixture, .* --only a,b,heat$"):
+        analysed(tmp_path, heat, parts + "# factor | heat | 0 | 1\na,b,c,y,heat\n")
+    assert analysed(tmp_path, runs, head).analysis.mixture is not None
     # One component follows from the others: with one left out it is a plane, which is found.
     found = analysed(tmp_path, runs, head, only=("a", "b"))
     assert found.analysis.fits[0].r_squared == pytest.approx(1.0)

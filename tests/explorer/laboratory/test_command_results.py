@@ -8,6 +8,7 @@ import pytest
 
 from doe.laboratory import TESTS
 from explorer.design.analysis import AnalyseOrder
+from explorer.design.choices import ModelOrder
 from explorer.design.run_plan import DesignOrder
 from explorer.errors import CommandError
 from explorer.laboratory.command_results import (
@@ -122,6 +123,9 @@ def test_a_sheet_is_that_of_the_command(tmp_path, monkeypatch):
     [
         (DesignOrder("plackett-burman", runs=12, fold=True), "--runs 12 --fold"),
         (DesignOrder("factorial", generators=("C=AB",)), "--generator C=AB"),
+        (DesignOrder("plackett-burman", runs=16, nonregular=True), "--runs 16 --nonregular"),
+        (DesignOrder("central-composite", blocks=3), "--blocks 3"),
+        (DesignOrder("d-optimal", model=ModelOrder.LINEAR, constraints=("A + 60*B <= 90",)), "'A + 60*B <= 90'"),
     ],
 )
 def test_options_of_a_design_are_part_of_its_command_line(order, said, tmp_path, monkeypatch):

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 from viser import UploadedFile
 
+from doe.designs import DESIGNS
 from doe.laboratory import TESTS
 from doe.laboratory.analysis import template_of
 from explorer.laboratory.command_results import CommandResult, template_file
@@ -109,6 +110,21 @@ def test_what_cannot_be_kept_is_refused(bench, name, content):
     notice = bench.do(lambda: bench.bench._readings._take(name, content))
     assert "allowed" in notice
     assert not bench.folder.exists() or not list(bench.folder.iterdir())
+
+
+def test_a_design_asks_for_what_it_takes(bench):
+    panel = bench.design
+    fields = {"runs": panel._size, "blocks": panel._blocks, "nonregular": panel._nonregular, "fold": panel._fold}
+    fields |= {"generators": panel._generators, "model": panel._model, "constraints": panel._constraints}
+    for name, design in DESIGNS.items():
+        panel._kind.value = name
+        event(panel._kind, name)
+        finished(bench.actions, bench.background)
+        assert {key for key, field in fields.items() if field.visible} == set(fields) & set(design.options), name
+    panel._kind.value = "box-behnken"
+    event(panel._kind, "box-behnken")
+    panel._blocks.value = 2
+    assert "3 factors; there are none that are orthogonal" in bench.do(panel._make)
 
 
 def test_a_photograph_from_the_browser_is_read_and_shown(bench):
