@@ -18,7 +18,7 @@ from solver.photograph.picture import NotAPile, Reason
 
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.bool_]
-Kind = Literal["plate", "foot", "given"]
+Kind = Literal["plate", "foot", "given", "support"]
 
 SHOULDER = 0.04
 """Share of the part's width, at either end, that is level where a plate shows beside the pile."""
@@ -28,6 +28,8 @@ REACH = 6
 """Pixels of the mask on either side of the rough line within which the edge is looked for."""
 MOST_SAG = 0.05
 """Depth of a bulging foot over its width; a round pile seen from 5° above has 0.044, which lowers 25° by 0.5°."""
+UNSEEN_ABOVE_DEG = 3.0
+"""How far above a plate a camera is taken to be at most, where no foot shows it."""
 MOST_TILT_DEG = 7.0
 BLOCK = 8.0
 
@@ -47,6 +49,8 @@ class BaseLine:
     left: float
     """x of the outermost columns that it was fitted to [px]."""
     right: float
+    above_deg: float = UNSEEN_ABOVE_DEG
+    """How far above the plate the camera may be (95 %), by the foot of the pile; nothing else tells it."""
 
     def at(self, x: Array) -> Array:
         """y [px] at ``x`` [px]."""
@@ -88,6 +92,7 @@ def sharp_base_line(grey: Array, rough: BaseLine, scale: float) -> BaseLine:
         rough.kind,
         (rough.left + 0.5) * scale - 0.5,
         (rough.right + 0.5) * scale - 0.5,
+        rough.above_deg,
     )
     width = start.right - start.left
     if rough.kind == "foot":
@@ -99,12 +104,13 @@ def sharp_base_line(grey: Array, rough: BaseLine, scale: float) -> BaseLine:
     y = start.at(x)[None, :] + depth[:, None]
     strip = ndimage.map_coordinates(grey, [y, np.broadcast_to(x, y.shape)], order=1, mode="nearest")
     # From outside the pile inward: outside is above a plate, and below a foot.
-    found = _crossings(*((strip, depth) if rough.kind == "plate" else (strip[::-1], depth[::-1])))
+    found = crossings(*((strip, depth) if rough.kind == "plate" else (strip[::-1], depth[::-1])))
     seen = np.isfinite(found)
     if seen.sum() < 8:
         # No edge of its own there: the rough line, to a pixel of the mask.
         return replace(start, slope_error=scale / width, offset_error=scale)
-    return _fitted(x[seen], (y[0] - depth[0])[seen] + found[seen], rough.kind, start.left, start.right)
+    fitted = _fitted(x[seen], (y[0] - depth[0])[seen] + found[seen], rough.kind, start.left, start.right)
+    return replace(fitted, above_deg=rough.above_deg)
 
 
 def given_base_line(left: float, right: float, columns: int) -> BaseLine:
@@ -145,12 +151,12 @@ def _foot(x: Array, bottoms: Array) -> BaseLine:
     if x[inner].size < 5:
         raise NotAPile(Reason.TOO_SMALL, f"what stands out is {x.size} pixels wide in the reduced picture")
     fitted = _fitted(x[inner], bottoms[inner], "foot", float(x[0]), float(x[-1]))
-    _check_sag(x, bottoms)
-    return fitted
+    return replace(fitted, above_deg=_above_deg(x, bottoms))
 
 
-def _check_sag(x: Array, bottoms: Array) -> None:
-    """NotAPile where the foot bulges downward like the near half of a round base seen from above."""
+def _above_deg(x: Array, bottoms: Array) -> float:
+    """How far above the plate the camera may be (95 %): a round foot's near half bulges downward by sin of it, over its
+    width twice. NotAPile where it is too far."""
     u = (x - x.mean()) / (0.5 * max(x[-1] - x[0], 1.0))
     inner = np.abs(u) < 1.0 - INNER
     # Near half of an ellipse: y = line + sag √(1 − u²).
@@ -166,6 +172,11 @@ def _check_sag(x: Array, bottoms: Array) -> None:
             f"the foot of the pile bulges by {sag:.0%} of its width, as seen from {degrees:.0f}° above; "
             "bring the camera down to the plate",
         )
+    alone = terms[:, 2] - terms[:, :2] @ np.linalg.lstsq(terms[:, :2], terms[:, 2], rcond=None)[0]
+    miss = bottoms[inner] - terms @ coefficients
+    n = max(4.0, min(inner.sum() / BLOCK, 1.0 + int(np.count_nonzero(np.diff(np.signbit(miss))))))
+    error = np.hypot(bent_miss, 0.3) / np.sqrt(n) / float(np.std(alone)) / (x[-1] - x[0])
+    return float(np.degrees(np.arcsin(min(2.0 * MOST_SAG, 2.0 * max(sag, 0.0) + 4.0 * error))))
 
 
 def _fitted(x: Array, y: Array, kind: Kind, left: float, right: float) -> BaseLine:
@@ -191,7 +202,7 @@ def _fitted(x: Array, y: Array, kind: Kind, left: float, right: float) -> BaseLi
     return BaseLine(float(offset), float(slope), error / across, error, kind, left, right)
 
 
-def _crossings(into: Array, steps: Array) -> Array:
+def crossings(into: Array, steps: Array) -> Array:
     """Place among ``steps`` (depths,) where each column of ``into`` is first half-way; NaN where it never is.
 
     ``into`` (depths, columns) are grey levels from outside to inside. The levels of both sides are means over

@@ -1,0 +1,133 @@
+"""What a pile of one tone with it stands on, and what stands in its apex: a disc, a tray's rim, a dish; a funnel's tip.
+
+To the silhouette they are one body with the pile, so that its base line lies too low or its top too high. Both show in
+how far the outline reaches at each height: on a body under the pile it leaps outward at one height on both sides, and
+goes straight down from there; at a funnel's tip it is as wide over a long stretch, with straight sides, and widens below.
+
+A gable on a house is a pile on a block, to a silhouette: it is cut in the same way, or refused where the block is higher.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from solver.photograph.picture import NotAPile, Reason
+
+Array = npt.NDArray[np.float64]
+Image = npt.NDArray[np.bool_]
+
+SHARP = 0.012
+"""Of the height: within twice as much the outline leaps from the pile out to the end of what is under it."""
+LEAP = 0.06
+"""Of how far the pile reaches there: a smaller leap is of bodies, or of a rounded foot."""
+SLACK = 3.0
+"""Pixels of the picture that a leap has at least."""
+UPRIGHT = 0.35
+"""Of what a flank would grow by from there to the base line: a body's side grows by less."""
+LOWEST, HIGHEST = 0.05, 0.75
+"""Of the height, between which a body under the pile ends."""
+DISTURBING = 0.15
+"""Of the height: a leap on one side alone below it leaves the window of the fit alone."""
+EVEN = 0.15
+"""Rise over run by which the top of a body under the pile may slope."""
+FLAT, ROUND = 1.0, 0.008
+"""Pixels of the picture, and share of the height, by which it may miss a line (root mean square)."""
+NECK = 1.25
+"""Width of a tip, over that where it is thinnest."""
+LEAST_NECK = 0.15
+"""Of the height: a body that sticks out of the apex is shorter."""
+THINNEST = 0.3
+"""Of the width of the pile: a tip is thinner."""
+
+
+@dataclass(frozen=True)
+class Support:
+    """The top of a body under the pile, in pixels of the outline: z = height + slope · (column + 1/2)."""
+
+    height: float
+    slope: float
+    slope_error: float
+    error: float
+    """Standard error of its height."""
+    left: float
+    right: float
+    """Ends of its top."""
+
+
+def support_under(tops: Array, pixel: float) -> Support | None:
+    """The body on which the pile of an outline of heights ``tops`` stands; None where the outline shows none.
+
+    ``pixel``: how many of the outline's there are in one of the picture. NotAPile where something is there, on one side
+    only or with no sharp corner, and reaches into the window of the fit.
+    """
+    height = float(tops.max())
+    apex = int(tops.argmax())
+    reach = np.stack([_reach(tops[apex::-1], height), _reach(tops[apex:], height)])
+    half = max(2, round(2.0 * pixel), round(SHARP * height))
+    z = np.arange(round(max(LOWEST * height, half + 1)), round(HIGHEST * height))
+    if z.size == 0 or height < 8 * half:
+        return None
+    over = np.minimum(z + half + round(0.2 * height), int(height) - 1)
+    grown = (reach[:, z + half] - reach[:, over]) / np.maximum(over - z - half, 1)
+    leap = reach[:, z - half] - reach[:, z + half] - 2.0 * half * 1.5 * grown
+    below = reach[:, [half]] - reach[:, z - half]
+    upright = below <= np.maximum(UPRIGHT * grown * z, SLACK * pixel)
+    size = leap / np.maximum(LEAP * reach[:, z + half], SLACK * pixel)
+    size = np.where(upright, size, 0.0)
+    both = np.flatnonzero(size.min(axis=0) >= 1.0)
+    # The highest one: what is under it is looked for again from there.
+    for k in both[::-1]:
+        found = _top(tops, apex, reach[:, z[k] + half], reach[:, z[k] - half], pixel)
+        if found is not None:
+            best = k - int(size.min(axis=0)[max(0, k - 2 * half) : k + 1][::-1].argmax())
+            return _top(tops, apex, reach[:, z[best] + half], reach[:, z[best] - half], pixel) or found
+    return None
+
+
+def severed(part: Image) -> Image | None:
+    """``part`` of a mask (row 0 on top) without the funnel or rod whose tip is in its apex; None without one."""
+    rows = np.flatnonzero(part.any(axis=1))
+    left, right = part.argmax(axis=1)[rows], part.shape[1] - 1 - part[:, ::-1].argmax(axis=1)[rows]
+    width = (right - left + 1).astype(np.float64)
+    widest = int(width[rows.size // 4 :].argmax()) + rows.size // 4
+    above = width[:widest]
+    if above.size < 8:
+        return None
+    thinnest = int(above.argmin())
+    # A cone is thinnest in its uppermost row; below a tip everything is wider.
+    thin = above <= max(NECK * above[thinnest], above[thinnest] + 1.0)
+    last = int(np.flatnonzero(thin)[-1])
+    first = last - int(np.argmin(thin[last::-1])) + 1 if not thin[: last + 1].all() else 0
+    long = last + 1 - first >= LEAST_NECK * rows.size or (first > 0 and above[:first].max() > 2.0 * above[thinnest])
+    if not long or above[thinnest] > THINNEST * width.max() or last + 8 > rows.size:
+        return None
+    cut = part.copy()
+    cut[: rows[last] + 1] = False
+    return cut
+
+
+def _reach(tops: Array, height: float) -> Array:
+    """Columns from the first of ``tops`` to the last one that is so high, per height 0, 1, …, shape (height,)."""
+    envelope = np.maximum.accumulate(tops[::-1])[::-1]
+    return np.searchsorted(-envelope, -np.arange(int(height), dtype=np.float64), side="right") - 1.0
+
+
+def _top(tops: Array, apex: int, inner: Array, outer: Array, pixel: float) -> Support | None:
+    """The line through the tops of the columns between ``inner`` and ``outer`` reach (left, right); None where they are
+    on no line: bodies are round."""
+    blur = round(2.0 * pixel)
+    left = np.arange(apex - int(outer[0]) + blur, apex - int(inner[0]) - blur)
+    right = np.arange(apex + int(inner[1]) + blur + 1, apex + int(outer[1]) - blur + 1)
+    if min(left.size, right.size) < 3:
+        return None
+    columns = np.concatenate([left, right])
+    slope, height = np.polyfit(columns + 0.5, tops[columns], 1)
+    miss = tops[columns] - slope * (columns + 0.5) - height
+    if abs(slope) > EVEN or float(np.sqrt(np.mean(miss**2))) > max(FLAT * pixel, ROUND * float(tops.max())):
+        return None
+    error = float(np.sqrt(np.mean(miss**2) + 0.25) / np.sqrt(max(4.0, columns.size / 8.0)))
+    ends = float(apex - outer[0]), float(apex + outer[1])
+    return Support(float(height), float(slope), error / float(np.std(columns)), error, *ends)
