@@ -22,6 +22,8 @@ Kind = Literal["plate", "foot", "given", "support"]
 
 SHOULDER = 0.04
 """Share of the part's width, at either end, that is level where a plate shows beside the pile."""
+SLOPES = (0.08, 0.2)
+"""Most by which the rise over run of both ends differs, of a plate's and of one that goes on beyond the picture."""
 INNER = 0.10
 """Share of the part's width at either end where the pile is too thin to tell its foot."""
 REACH = 6
@@ -68,7 +70,7 @@ def rough_base_line(part: Image) -> BaseLine:
     rows, x = part.shape[0], columns.astype(np.float64)
     tops = part.argmax(axis=0)[columns].astype(np.float64) - 0.5
     bottoms = rows - part[::-1].argmax(axis=0)[columns] - 0.5
-    plate = _shoulders(x, tops, bottoms)
+    plate = _shoulders(x, tops, bottoms, bool(part[:, 0].any() and part[:, -1].any()))
     if plate is not None:
         return plate
     at_side = [side for side, column in (("left", 0), ("right", -1)) if part[:, column].any()]
@@ -77,7 +79,7 @@ def rough_base_line(part: Image) -> BaseLine:
         raise NotAPile(
             Reason.CUT_BY_FRAME,
             f"what stands out reaches the {where} edge of the picture, with no level plate on both sides of it; "
-            "show the whole pile, or state --baseline",
+            "show the whole pile, and the plate's edge from its level; or state --baseline",
         )
     return _foot(x, bottoms)
 
@@ -129,8 +131,11 @@ def check_tilt(line: BaseLine) -> None:
         )
 
 
-def _shoulders(x: Array, tops: Array, bottoms: Array) -> BaseLine | None:
-    """The line through the tops of both ends, if these are level stretches of one line; None otherwise."""
+def _shoulders(x: Array, tops: Array, bottoms: Array, across: bool) -> BaseLine | None:
+    """The line through the tops of both ends, if these are level stretches of one line; None otherwise.
+
+    ``across``: they go on beyond both sides of the picture, as a plate does that a lens may bend.
+    """
     n = max(5, round(SHOULDER * x.size))
     if x.size < 6 * n:
         return None
@@ -139,7 +144,7 @@ def _shoulders(x: Array, tops: Array, bottoms: Array) -> BaseLine | None:
     own = [np.polyfit(x[side], tops[side], 1)[0] for side in (slice(0, n), slice(-n, None))]
     misses = np.abs(tops[ends] - slope * x[ends] - offset)
     # A level stretch misses by pixel steps and noise; a flank's foot slopes one way on the left, another on the right.
-    level = np.median(misses) < 1.0 and np.percentile(misses, 90) < 2.5 and abs(own[0] - own[1]) < 0.08
+    level = np.median(misses) < 1.0 and np.percentile(misses, 90) < 2.5 and abs(own[0] - own[1]) < SLOPES[across]
     thick = np.median((bottoms - tops)[ends]) >= 3.0
     if not (level and thick):
         return None

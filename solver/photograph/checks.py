@@ -140,8 +140,8 @@ def check_below(share: float) -> None:
     if share > MOST_BELOW:
         raise NotAPile(
             Reason.CAMERA_LOOKS_DOWN,
-            f"the flanks go on below the base line, by {share:.0%} of the height at least: the plate is seen from above, "
-            "and its edge lies behind the pile; bring the camera down to the plate, or state --baseline",
+            f"the flanks go on below the base line, by {share:.0%} of the height at least: the plate is seen from "
+            "above and its edge lies behind the pile; bring the camera down to the plate, or state --baseline",
         )
 
 
@@ -168,7 +168,10 @@ def check_photographed(noise: float, inside: Array, outside: Array, roughness: f
 
     A photograph has noise, and one that was made black and white has the outline of bodies.
     """
-    flat = all(one.size > 0 and np.unique(one, return_counts=True)[1].max() >= DRAWN_SHARE * one.size for one in (inside, outside))
+    flat = all(
+        one.size > 0 and np.unique(one, return_counts=True)[1].max() >= DRAWN_SHARE * one.size
+        for one in (inside, outside)
+    )
     if noise <= DRAWN_NOISE and flat and roughness <= DRAWN_MISS:
         raise NotAPile(
             Reason.DRAWN,

@@ -1,9 +1,9 @@
 """How far a lens bends the picture, by the base line, which is straight; and the picture without that bend.
 
 Radial distortion of the first order (Brown 1966): a place at the distance r from the middle of the picture is seen at
-r (1 + k r²), r over half the diagonal; k < 0 is a barrel, k > 0 a pincushion. A straight line that passes the middle at
-the distance a, seen at (x, y) along and across itself, bows by a k r², so that k is the better known the farther the base
-line is from the middle and the longer it shows; one through the middle stays straight in any lens.
+r (1 + k r²), r over half the diagonal; k < 0 is a barrel, k > 0 a pincushion. A straight line that passes the middle
+at the distance a bows by a k r², so that k is the better known the farther the base line is from the middle and the
+longer it shows; one through the middle stays straight in any lens.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def bent(x: Array, y: Array, k: float) -> tuple[Array, Array]:
 
 def centred(x: Array, y: Array, shape: tuple[int, ...]) -> tuple[Array, Array, float]:
     """Pixels of a picture of ``shape`` (rows, columns) from its middle over half its diagonal, and that [px]."""
-    half = 0.5 * float(np.hypot(*shape))
+    half = 0.5 * float(np.hypot(shape[0], shape[1]))
     return (x - 0.5 * (shape[1] - 1)) / half, (y - 0.5 * (shape[0] - 1)) / half, half
 
 
@@ -89,8 +89,10 @@ def straightened(picture: Picture, k: float) -> Picture:
 
 
 def bend_of(grey: Array, part: Image, line: BaseLine, scale: float) -> Bend:
-    """The bend that the plate's edge beside the pile shows, or the foot of the pile; ``part`` is of a mask with ``scale``
-    pixels of ``grey`` along one of its own."""
+    """The bend that the plate's edge beside the pile shows, or the foot of the pile.
+
+    ``part`` is of a mask with ``scale`` pixels of ``grey`` along one of its own.
+    """
     columns = np.flatnonzero(part.any(axis=0))
     if columns.size < 40:
         return UNKNOWN
@@ -134,8 +136,10 @@ def _beside(edge: Array) -> Image:
 
 
 def _fitted(x: Array, y: Array, half: float, foot: bool) -> Bend:
-    """k of the straight line that is seen through x, y, by repeated least squares: with a small change dk of k a straight
-    line v = a + b u is seen as v = a + b u + dk r² (v - b u)."""
+    """k of the straight line that is seen through x, y, by repeated least squares.
+
+    With a small change dk of k a straight line v = a + b u is seen as v = a + b u + dk r² (v - b u).
+    """
     k = slope = 0.0
     keep = np.ones(x.size, dtype=bool)
     for _ in range(10):

@@ -157,8 +157,7 @@ def _measured(
     view = View(_lens_deg(grey, patch, tops, flanks, bend.left_over), line.above_deg, near)
     angles = angles_of(seen, flanks, patch.step, line, min(noise / max(contrast, 1.0), 0.125), view)
     checks.check_levels(angles.level_shift_deg)
-    both = (angles.left, angles.right)
-    checks.check_bend([one.thirds_deg for one in both], [one.parts_deg["flank"] for one in both])
+    checks.check_bend([angles.left.thirds_deg, angles.right.thirds_deg], angles.bend_deg)
     middle = 0.5 * (feet[0] + feet[1])
     place = np.array(patch.foot) + np.array(patch.along) * middle * patch.step
     origin = picture.place(place)
@@ -184,8 +183,8 @@ def _measured(
 def _standing(
     grey: Array, found: Found, line: BaseLine, scale: float, noise: float
 ) -> tuple[Patch, Silhouettes, Array, BaseLine]:
-    """The pile upright on ``line``, or on the top of what stands on it and has the pile's tone, with its silhouettes and
-    its heights per column."""
+    """The pile upright on ``line``, or on the top of what stands on it in the pile's tone, with its silhouettes and its
+    heights per column."""
     for _ in range(MOST_SUPPORTS):
         patch = upright(grey, found.candidate.part, line, scale)
         seen = silhouettes(patch, noise)
@@ -208,7 +207,13 @@ def _on(under: Support, patch: Patch) -> BaseLine:
     y = patch.foot[1] + patch.step * (patch.along[1] * ends - patch.along[0] * z)
     slope = float((y[1] - y[0]) / (x[1] - x[0]))
     return BaseLine(
-        float(y[0] - slope * x[0]), slope, under.slope_error, under.error * patch.step, "support", float(x[0]), float(x[1])
+        float(y[0] - slope * x[0]),
+        slope,
+        under.slope_error,
+        under.error * patch.step,
+        "support",
+        float(x[0]),
+        float(x[1]),
     )
 
 
@@ -222,7 +227,9 @@ def _lens_deg(
         for flank in flanks:
             inner, outer = sorted(flank.u)
             column = np.arange(int(inner), int(outer) + 1)
-            found.append(_directions(patch, column + 0.5, tops[column], flank_feet(flanks), grey.shape, k))
+            found.append(
+                _directions(patch, column.astype(np.float64) + 0.5, tops[column], flank_feet(flanks), grey.shape, k)
+            )
         return np.array(found)
 
     step = 0.01

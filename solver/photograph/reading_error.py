@@ -15,10 +15,10 @@ and three of what the silhouette is of:
 
 flank    a straight flank has one slope. Lines through the lower, the middle and the upper third of the window differ by
          the outline's roughness r about a parabola, by r √12 / (√n L) as above, n the stretches on one side of it; the
-         variance of the three beyond SURE_BEND of that, by which chance alone has it in one of twenty
+         variance of the three beyond SURE_BEND of that, by which chance alone has it in one of twenty, over three
 lens     the change of the angle with k (`lens.py`) times the standard deviation of k that is left
 camera   a cone of angle α looks like tan² α' = tan² α cos² e - sin² e from e above its foot, and like tan α cos θ from
-         the level of the foot where half of it fills the angle θ (both from the planes through the camera that touch it).
+         the level of the foot where half of it fills the angle θ (the planes through the camera that touch it).
          e is up to what the foot of the pile allows, or UNSEEN_ABOVE_DEG; θ is known from the focal length in the file,
          and up to UNSEEN_NEAR elsewhere. Anything up to there is as likely: standard deviation 1/√3 of it
 
@@ -29,6 +29,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -89,6 +90,8 @@ class Angles:
     mean: Angle
     level_shift_deg: float
     """Largest half difference between the angles at 35 % and at 65 %; infinite where one of them cannot be read."""
+    bend_deg: tuple[float, float]
+    """Standard deviation of the thirds of the left and the right flank beyond that by roughness."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +125,8 @@ def angles_of(
     both = np.sqrt(level_known.mean() ** 2 + window_of_mean + (pixel**2).sum() / 4.0 + LEAST_DEG**2)
     sides, tops = _thirds(seen.images[1]), column_tops(seen.images[1]).astype(np.float64)
     thirds = np.array([[np.nan if third is None else third.angle_deg for third in side] for side in sides])
-    flank = np.array([_bend_deg(side, line, tops) for side, line in zip(sides, flanks, strict=True)])
+    bend = np.array([_bend_deg(side, line, tops) for side, line in zip(sides, flanks, strict=True)])
+    flank = bend / np.sqrt(len(THIRDS) - 1)
     lens = np.array(view.lens_deg)
     camera = np.array([_camera_deg(angle, view) for angle in value])
     found = [
@@ -135,7 +139,7 @@ def angles_of(
         )
     ]
     shift = float(np.abs(level).max()) if np.isfinite(level).all() else float("inf")
-    return Angles(*found, shift)
+    return Angles(found[0], found[1], found[2], shift, (float(bend[0]), float(bend[1])))
 
 
 def _angle(value: float, thirds: Array, reading: float, flank: float, lens: float, camera: float) -> Angle:
@@ -146,7 +150,7 @@ def _angle(value: float, thirds: Array, reading: float, flank: float, lens: floa
 
 def _thirds(image: Image) -> list[list[FlankLine | None]]:
     """Lines of the left and the right flank by thirds of the window, from below."""
-    lines = [flank_lines(image, 1.0, window=window) for window in zip(THIRDS, THIRDS[1:], strict=False)]
+    lines = [flank_lines(image, 1.0, window=window) for window in pairwise(THIRDS)]
     return [list(side) for side in zip(*lines, strict=True)]
 
 

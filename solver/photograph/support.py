@@ -2,9 +2,9 @@
 
 To the silhouette they are one body with the pile, so that its base line lies too low or its top too high. Both show in
 how far the outline reaches at each height: on a body under the pile it leaps outward at one height on both sides, and
-goes straight down from there; at a funnel's tip it is as wide over a long stretch, with straight sides, and widens below.
+goes straight down from there; at a funnel's tip it is as wide over a long stretch, and widens below.
 
-A gable on a house is a pile on a block, to a silhouette: it is cut in the same way, or refused where the block is higher.
+To a silhouette a gable on a house is a pile on a block: nothing tells them apart, and it is cut in the same way.
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from solver.photograph.picture import NotAPile, Reason
-
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.bool_]
 
@@ -23,20 +21,22 @@ SHARP = 0.012
 """Of the height: within twice as much the outline leaps from the pile out to the end of what is under it."""
 LEAP = 0.06
 """Of how far the pile reaches there: a smaller leap is of bodies, or of a rounded foot."""
+BOTH = 1.7
+"""Times that on the mean of both sides: the pile may stand near one end."""
 SLACK = 3.0
 """Pixels of the picture that a leap has at least."""
 UPRIGHT = 0.35
 """Of what a flank would grow by from there to the base line: a body's side grows by less."""
 LOWEST, HIGHEST = 0.05, 0.75
 """Of the height, between which a body under the pile ends."""
-DISTURBING = 0.15
-"""Of the height: a leap on one side alone below it leaves the window of the fit alone."""
+LEAST_HIGH = 10.0
+"""Pixels of the picture: of a layer of bodies that is no higher it cannot be seen that it is none."""
 EVEN = 0.15
 """Rise over run by which the top of a body under the pile may slope."""
 FLAT, ROUND = 1.0, 0.008
 """Pixels of the picture, and share of the height, by which it may miss a line (root mean square)."""
-NECK = 1.25
-"""Width of a tip, over that where it is thinnest."""
+NECK, STEADY = 1.25, 0.9
+"""Width of the end of a tip over that where it is thinnest, and of its beginning over that."""
 LEAST_NECK = 0.15
 """Of the height: a body that sticks out of the apex is shorter."""
 THINNEST = 0.3
@@ -60,14 +60,14 @@ class Support:
 def support_under(tops: Array, pixel: float) -> Support | None:
     """The body on which the pile of an outline of heights ``tops`` stands; None where the outline shows none.
 
-    ``pixel``: how many of the outline's there are in one of the picture. NotAPile where something is there, on one side
-    only or with no sharp corner, and reaches into the window of the fit.
+    ``pixel``: how many of the outline's there are in one of the picture. Something on one side only is none: bodies
+    make such corners as well.
     """
     height = float(tops.max())
     apex = int(tops.argmax())
     reach = np.stack([_reach(tops[apex::-1], height), _reach(tops[apex:], height)])
     half = max(2, round(2.0 * pixel), round(SHARP * height))
-    z = np.arange(round(max(LOWEST * height, half + 1)), round(HIGHEST * height))
+    z = np.arange(round(max(LOWEST * height, LEAST_HIGH * pixel, half + 1)), round(HIGHEST * height))
     if z.size == 0 or height < 8 * half:
         return None
     over = np.minimum(z + half + round(0.2 * height), int(height) - 1)
@@ -77,7 +77,7 @@ def support_under(tops: Array, pixel: float) -> Support | None:
     upright = below <= np.maximum(UPRIGHT * grown * z, SLACK * pixel)
     size = leap / np.maximum(LEAP * reach[:, z + half], SLACK * pixel)
     size = np.where(upright, size, 0.0)
-    both = np.flatnonzero(size.min(axis=0) >= 1.0)
+    both = np.flatnonzero((size.min(axis=0) >= 1.0) & (size.mean(axis=0) >= BOTH))
     # The highest one: what is under it is looked for again from there.
     for k in both[::-1]:
         found = _top(tops, apex, reach[:, z[k] + half], reach[:, z[k] - half], pixel)
@@ -93,16 +93,14 @@ def severed(part: Image) -> Image | None:
     left, right = part.argmax(axis=1)[rows], part.shape[1] - 1 - part[:, ::-1].argmax(axis=1)[rows]
     width = (right - left + 1).astype(np.float64)
     widest = int(width[rows.size // 4 :].argmax()) + rows.size // 4
-    above = width[:widest]
-    if above.size < 8:
+    long = max(4, round(LEAST_NECK * rows.size))
+    # A cone is narrower by a tenth of its width so much higher up; a tip is not.
+    tip = np.flatnonzero((width[:-long] >= STEADY * width[long:]) & (width[long:] <= THINNEST * width[widest])) + long
+    tip = tip[tip < widest]
+    if tip.size == 0:
         return None
-    thinnest = int(above.argmin())
-    # A cone is thinnest in its uppermost row; below a tip everything is wider.
-    thin = above <= max(NECK * above[thinnest], above[thinnest] + 1.0)
-    last = int(np.flatnonzero(thin)[-1])
-    first = last - int(np.argmin(thin[last::-1])) + 1 if not thin[: last + 1].all() else 0
-    long = last + 1 - first >= LEAST_NECK * rows.size or (first > 0 and above[:first].max() > 2.0 * above[thinnest])
-    if not long or above[thinnest] > THINNEST * width.max() or last + 8 > rows.size:
+    last = int(np.flatnonzero(width[:widest] <= NECK * width[tip[-1] - long : tip[-1] + 1].min())[-1])
+    if last + 8 > rows.size:
         return None
     cut = part.copy()
     cut[: rows[last] + 1] = False
@@ -112,7 +110,7 @@ def severed(part: Image) -> Image | None:
 def _reach(tops: Array, height: float) -> Array:
     """Columns from the first of ``tops`` to the last one that is so high, per height 0, 1, …, shape (height,)."""
     envelope = np.maximum.accumulate(tops[::-1])[::-1]
-    return np.searchsorted(-envelope, -np.arange(int(height), dtype=np.float64), side="right") - 1.0
+    return np.searchsorted(-envelope, -np.arange(int(height), dtype=np.float64), side="right").astype(np.float64) - 1.0
 
 
 def _top(tops: Array, apex: int, inner: Array, outer: Array, pixel: float) -> Support | None:

@@ -5,7 +5,7 @@ Every picture draws all of it from a seed, so that one may have a tray, a bent l
 """
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -110,7 +110,7 @@ def any_shot(seed):
         lens=lens,
         fill=rng.uniform(0.35, 0.6),
         aside=rng.uniform(-0.05, 0.05),
-        rough=rng.choice([0.0, 0.01, 0.02]),
+        rough=rng.choice([0.0, 0.003, 0.006]),
     )
     tall = height * stage.fill * 0.5 / 0.62
     look = Look(
@@ -136,7 +136,8 @@ def any_shot(seed):
 def shot(seed):
     """The picture of ``seed``, read."""
     stage, look, focal = any_shot(seed)
-    return Shot(seed, stage, look, focal, read_photograph(picture_of(staged(stage, look))))
+    picture = replace(picture_of(staged(stage, look)), focal=focal)
+    return Shot(seed, stage, look, focal, read_photograph(picture))
 
 
 def summary(shots):

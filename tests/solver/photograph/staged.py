@@ -5,6 +5,7 @@ the mean of four rays. The plate is at height 0, x goes to the right, y away fro
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -119,12 +120,12 @@ def bodies(stage):
 
 
 def hit(profile, middle, camera, rays):
-    """Distance along ``rays`` to the solid ``profile`` about x = ``middle``, infinite beside it, and the normal there."""
+    """Distance along ``rays`` to the solid ``profile`` about x = ``middle``, infinite beside it, and its normal."""
     px, py, pz = camera.place - np.array([middle, 0.0, 0.0])
     dx, dy, dz = rays
     nearest = np.full(dx.shape, np.inf)
     normal = np.zeros_like(rays)
-    for (r0, z0), (r1, z1) in zip(profile, profile[1:], strict=False):
+    for (r0, z0), (r1, z1) in pairwise(profile):
         if z0 == z1:
             with np.errstate(divide="ignore", invalid="ignore"):
                 t = (z0 - pz) / dz
@@ -180,7 +181,9 @@ def staged(stage, look):
         depth = np.minimum(depth, t)
     if look.shadow:
         shift = (-round(2 * look.shadow_shift[1] * columns), round(2 * look.shadow_shift[0] * columns))
-        shade = ndimage.gaussian_filter(ndimage.shift(pile.astype(float), shift, order=0), 2 * look.shadow_blur * columns)
+        shade = ndimage.gaussian_filter(
+            ndimage.shift(pile.astype(float), shift, order=0), 2 * look.shadow_blur * columns
+        )
         grey = np.where(pile, grey, grey * (1.0 - look.shadow * shade))
     return developed(grey.reshape(rows, 2, columns, 2).mean(axis=(1, 3)), look, rng)
 
