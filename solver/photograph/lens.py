@@ -60,7 +60,7 @@ UNKNOWN = Bend(0.0, float("inf"))
 def straight(x: Array, y: Array, k: float) -> tuple[Array, Array]:
     """Places without the bend of a lens, of places as seen; both from the middle, over half the diagonal."""
     share = np.ones_like(x)
-    for _ in range(20):
+    for _ in range(50):
         share = 1.0 / (1.0 + k * (x * x + y * y) * share * share)
     return x * share, y * share
 

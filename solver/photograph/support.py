@@ -25,15 +25,17 @@ BOTH = 1.7
 """Times that on the mean of both sides: the pile may stand near one end."""
 SLACK = 3.0
 """Pixels of the picture that a leap has at least."""
-UPRIGHT = 0.35
-"""Of what a flank would grow by from there to the base line: a body's side grows by less."""
+SIDE = (0.25, 0.8)
+"""Shares of its height between which the side of a body under the pile goes straight down; that of bodies is round."""
+UPRIGHT, LEAST_UPRIGHT = 0.07, 1.2
+"""Over that height, and pixels of the picture, by which it may grow there: a sphere's grows by 0.1 of it."""
 LOWEST, HIGHEST = 0.05, 0.75
 """Of the height, between which a body under the pile ends."""
 LEAST_HIGH = 10.0
 """Pixels of the picture: of a layer of bodies that is no higher it cannot be seen that it is none."""
 EVEN = 0.15
 """Rise over run by which the top of a body under the pile may slope."""
-FLAT, ROUND = 1.0, 0.008
+FLAT, ROUND = 1.0, 0.003
 """Pixels of the picture, and share of the height, by which it may miss a line (root mean square)."""
 NECK, STEADY = 1.25, 0.9
 """Width of the end of a tip over that where it is thinnest, and of its beginning over that."""
@@ -73,8 +75,8 @@ def support_under(tops: Array, pixel: float) -> Support | None:
     over = np.minimum(z + half + round(0.2 * height), int(height) - 1)
     grown = (reach[:, z + half] - reach[:, over]) / np.maximum(over - z - half, 1)
     leap = reach[:, z - half] - reach[:, z + half] - 2.0 * half * 1.5 * grown
-    below = reach[:, [half]] - reach[:, z - half]
-    upright = below <= np.maximum(UPRIGHT * grown * z, SLACK * pixel)
+    low, high = (np.round(share * z).astype(np.int64) for share in SIDE)
+    upright = reach[:, low] - reach[:, high] <= np.maximum(UPRIGHT * z, LEAST_UPRIGHT * pixel)
     size = leap / np.maximum(LEAP * reach[:, z + half], SLACK * pixel)
     size = np.where(upright, size, 0.0)
     both = np.flatnonzero((size.min(axis=0) >= 1.0) & (size.mean(axis=0) >= BOTH))
