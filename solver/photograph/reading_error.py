@@ -14,7 +14,7 @@ pixel    jitter of the edge in each column, half a pixel's rounding and the nois
 and three of what the silhouette is of:
 
 flank    a straight flank has one slope. Lines through the lower, the middle and the upper third of the window differ by
-         the outline's roughness r about a parabola, by r √12 / (√n L) as above, n the stretches on one side of it; the
+         the outline's roughness r about two lines, by r √12 / (√n L) as above, n the stretches on one side of it; the
          variance of the three beyond SURE_BEND of that, by which chance alone has it in one of twenty, over three
 lens     the change of the angle with k (`lens.py`) times the standard deviation of k that is left
 camera   a cone of angle α looks like tan² α' = tan² α cos² e - sin² e from e above its foot, and like tan α cos θ from
@@ -54,6 +54,8 @@ BLOCK = 8.0
 LEAST_DEG = 0.02
 THIRDS = (0.2, 0.4, 0.6, 0.8)
 """Ends of the thirds of the window, over the height."""
+CORNERS = tuple(np.linspace(0.08, 0.92, 15))
+"""Places along a flank where its slope may change."""
 SURE_BEND = 3.0
 """χ²/2 with two degrees of freedom at 95 %."""
 COARSE_DEG = 3.0
@@ -157,14 +159,18 @@ def _thirds(image: Image) -> list[list[FlankLine | None]]:
 def _bend_deg(thirds: Sequence[FlankLine | None], flank: FlankLine, tops: Array) -> float:
     """Standard deviation of the angles of ``thirds`` beyond that by the roughness of the outline ``tops`` [°].
 
-    The roughness is that about a parabola, so that a smooth bend of the whole ``flank`` is none.
+    The roughness is that about two straight stretches with the best corner between them, so that neither a corner nor a
+    smooth bend of the whole ``flank`` is any.
     """
     known = [third.angle_deg for third in thirds if third is not None]
     if len(known) < 2:
         return 0.0
     inner, outer = sorted(flank.u)
     columns = np.arange(int(inner), int(outer) + 1)
-    miss = tops[columns] - np.polynomial.Polynomial.fit(columns, tops[columns], 2)(columns)
+    x = np.linspace(0.0, 1.0, columns.size)
+    straight = (np.stack([np.ones_like(x), x, np.maximum(x - corner, 0.0)], axis=1) for corner in CORNERS)
+    misses = [tops[columns] - terms @ np.linalg.lstsq(terms, tops[columns], rcond=None)[0] for terms in straight]
+    miss = min(misses, key=np.linalg.norm)
     n = max(1.0, (1.0 + np.count_nonzero(np.diff(np.signbit(miss)))) / 3.0)
     scatter = np.sqrt(12.0 * np.mean(miss**2) / n) / (columns.size / 3.0) / (1.0 + flank.slope**2)
     if np.degrees(scatter) > COARSE_DEG:
