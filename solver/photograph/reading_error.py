@@ -58,7 +58,7 @@ CORNERS = tuple(np.linspace(0.08, 0.92, 15))
 """Places along a flank where its slope may change."""
 SURE_BEND = 3.0
 """χ²/2 with two degrees of freedom at 95 %."""
-COARSE_DEG = 3.0
+COARSE_DEG = 2.0
 """Scatter of the thirds from which on a few large bodies make them, and they tell nothing of a bend."""
 UNSEEN_NEAR = 0.1
 """Half the width of the pile over the distance of the camera, where nothing tells it: five widths."""
