@@ -65,9 +65,9 @@ def _panel(picture: Picture, reading: PhotographedPile | Refusal) -> Image.Image
         x, y = reading.in_picture(u, z)
         return np.stack([(x + 0.5) * zoom, (y + 0.5) * zoom + head], axis=1)
 
-    ends = np.array([0.0, picture.width - 1.0])
-    base = np.stack([(ends + 0.5) * zoom, (reading.base.at(ends) + 0.5) * zoom + head], axis=1)
-    _line(draw, base, BASE, 2)
+    x = np.linspace(0.0, picture.width - 1.0, 33)
+    x, y = reading.as_seen(x, reading.base.at(x))
+    _line(draw, np.stack([(x + 0.5) * zoom, (y + 0.5) * zoom + head], axis=1), BASE, 2)
     _line(draw, place(reading.outline.u, reading.outline.top), OUTLINE, 1)
     for flank in reading.flanks:
         _line(draw, place(np.array(flank.u), np.array(flank.z)), FLANK, 4)

@@ -30,6 +30,7 @@ from explorer.report.content import (
     Word,
 )
 from explorer.report.figures.style import ASSUMPTION, CHOSEN, FACTOR, TARGET, axis, chart, label, line
+from explorer.tables.photograph import lens_words, thirds_words
 from explorer.units import MISSING, fixed, number
 from solver.photograph import PhotographedPile, Refusal, open_picture
 from solver.photograph.reading_error import COVERAGE
@@ -55,6 +56,11 @@ class ReadPile(Record):
     u: tuple[float, ...]
     z: tuple[float, ...]
     """The outline over the base line."""
+    left_thirds: tuple[float, ...] = ()
+    right_thirds: tuple[float, ...] = ()
+    """Angles of the lower, the middle and the upper third of the fit [°]."""
+    lens: float = 0.0
+    """k of the lens that was taken out of the picture; 0: none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,10 +194,26 @@ def _angles(result: PhotographResult) -> Table:
         factor, unit = (1e3, "mm") if pile.unit == "m" else (1.0, "px")
         angles = [f"{fixed(value)} ± {fixed(half)}°" for value, half in (pile.left, pile.right, pile.mean)]
         sizes = [f"{number(factor * length, 4)} {unit}" for length in (pile.height, pile.half_width)]
-        rows.append((pile.name, *angles[:2], Strong(angles[2]), *sizes))
-    rows += [(name, *[MISSING] * 5) for name in result.refused]
-    header = ("picture", "left flank", "right flank", "mean", "height", "half-width")
-    return Table(header, tuple(rows), "±: 95 % of reading this silhouette; another pour differs by far more.")
+        thirds = [thirds_words(one) for one in (pile.left_thirds, pile.right_thirds)]
+        rows.append((pile.name, *angles[:2], Strong(angles[2]), *sizes, *thirds))
+    rows += [(name, *[MISSING] * 7) for name in result.refused]
+    header = (
+        "picture",
+        "left flank",
+        "right flank",
+        "mean",
+        "height",
+        "half-width",
+        "left by thirds",
+        "right by thirds",
+    )
+    lenses = "".join(f" {pile.name}: {lens_words(pile.lens)}." for pile in result.piles if pile.lens)
+    return Table(
+        header,
+        tuple(rows),
+        "±: 95 % of reading this silhouette, with a bend of its flanks, of lens and camera; another pour differs by "
+        f"far more. By thirds: slopes [°] of the lower, middle and upper third of the fit.{lenses}",
+    )
 
 
 def _read(pile: PhotographedPile) -> ReadPile:
@@ -209,4 +231,7 @@ def _read(pile: PhotographedPile) -> ReadPile:
         pile.half_width,
         tuple(pile.outline.u[::step].tolist()),
         tuple(pile.outline.top[::step].tolist()),
+        pile.angles.left.thirds_deg,
+        pile.angles.right.thirds_deg,
+        pile.lens,
     )

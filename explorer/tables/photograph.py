@@ -11,7 +11,7 @@ import numpy.typing as npt
 from scipy import stats
 
 from explorer.tables.text_table import text_table
-from explorer.units import fixed, signed
+from explorer.units import MISSING, fixed, signed
 from solver.photograph import PhotographedPile, Refusal
 from solver.photograph.reading_error import COVERAGE, Angle
 
@@ -25,10 +25,16 @@ MOST_POINTS = 400
 Rows = Sequence[tuple[str, str]]
 """What was read → its value, with its unit."""
 NOTE = (
-    "95 % and standard error: of reading this silhouette; another pour differs by far more. Roughness: RMS distance of "
-    "the outline from its lines."
+    "95 % and standard error: of reading this silhouette, with a bend of its flanks, of lens and camera; another pour "
+    "differs by far more. Thirds: lower, middle and upper third of the fit. Roughness: RMS distance of the outline "
+    "from its lines."
 )
-BASES = {"plate": "the plate beside the pile", "foot": "the foot of the pile", "given": "--baseline"}
+BASES = {
+    "plate": "the plate beside the pile",
+    "foot": "the foot of the pile",
+    "given": "--baseline",
+    "support": "the top of what is under the pile",
+}
 
 
 def measure_text(measured: MeasuredPhotographs) -> str:
@@ -49,13 +55,17 @@ def measure_text(measured: MeasuredPhotographs) -> str:
             "unit",
             "tilt °",
             "base line",
+            "thirds left °",
+            "thirds right °",
         )
         parts.append(text_table(head, rows))
     if measured.piles:
         parts.append(
-            "±: 95 % of reading this silhouette; another pour differs by far more. Roughness: RMS distance of the "
-            "outline from its lines."
+            "±: 95 % of reading this silhouette, with a bend of its flanks, of lens and camera; another pour "
+            "differs by far more. Roughness: RMS distance of the outline from its lines. Thirds: slopes of the lower, "
+            "middle and upper third of the fit."
         )
+        parts += [f"{pile.name}: {lens_words(pile.lens)}" for pile in measured.piles if pile.lens]
     if len(measured.piles) > 1:
         parts.append(_over_pictures(measured.piles))
     if measured.simulated is not None:
@@ -70,6 +80,16 @@ def angle_words(value_deg: float, error_deg: float) -> str:
         f"{fixed(value_deg)}° (95 % {fixed(value_deg - reach)} … {fixed(value_deg + reach)}°; standard error "
         f"{fixed(error_deg)}°)"
     )
+
+
+def lens_words(k: float) -> str:
+    """What was taken out of a picture that a lens had bent by ``k``."""
+    return f"the lens bends the base line ({'barrel' if k < 0 else 'pincushion'}, k = {signed(k, 3)}): taken out"
+
+
+def thirds_words(thirds_deg: Sequence[float | None]) -> str:
+    """Slopes of the lower, the middle and the upper third of a flank [°]."""
+    return " / ".join(MISSING if one is None or np.isnan(one) else fixed(one, 1) for one in thirds_deg)
 
 
 def measure_tables(result: Mapping[str, Any]) -> dict[str, Rows]:
@@ -93,10 +113,15 @@ def _pile_rows(picture: Mapping[str, Any]) -> Rows:
         ("angle of repose", angles["mean"]),
         ("left flank", angles["left"]),
         ("right flank", angles["right"]),
+        *(
+            (f"{side} by thirds", f"{thirds_words(picture['angles'][side]['thirds_deg'])}°")
+            for side in ("left", "right")
+        ),
         ("height", f"{fixed(picture['height'], places)} {unit}"),
         ("half-width", f"{fixed(picture['half_width'], places)} {unit}"),
         ("roughness", f"{fixed(roughness, places)} {unit}"),
         ("base line", f"{BASES[base['found_by']]}, tilted by {signed(base['tilt_deg'])}°"),
+        *([("lens", lens_words(picture["lens_k"]))] if picture["lens_k"] else []),
     )
 
 
@@ -159,6 +184,8 @@ def _row(pile: PhotographedPile) -> tuple[str, ...]:
         unit,
         f"{pile.base.tilt_deg:+.2f}",
         BASES[pile.base.kind],
+        thirds_words(angles.left.thirds_deg),
+        thirds_words(angles.right.thirds_deg),
     )
 
 
@@ -174,6 +201,8 @@ def _simulated_row(simulated: SimulatedPiles) -> tuple[str, ...]:
         "mm",
         "-",
         f"mean and SD of {simulated.height.size} views of {simulated.piles} pile{'s' * (simulated.piles > 1)}",
+        "-",
+        "-",
     )
 
 
@@ -229,7 +258,13 @@ def _pile_result(pile: PhotographedPile) -> dict[str, Any]:
         "picture": pile.name,
         "pile": True,
         "angles": {
-            name: {"value_deg": angle.value_deg, "interval_deg": list(angle.interval_deg), "error_deg": angle.error_deg}
+            name: {
+                "value_deg": angle.value_deg,
+                "interval_deg": list(angle.interval_deg),
+                "error_deg": angle.error_deg,
+                "error_parts_deg": angle.parts_deg,
+                "thirds_deg": [one if np.isfinite(one) else None for one in angle.thirds_deg],
+            }
             for name, angle in angles.items()
         },
         "length_unit": unit,
@@ -243,6 +278,7 @@ def _pile_result(pile: PhotographedPile) -> dict[str, Any]:
             "y_at_x0_px": pile.base.offset,
             "slope": pile.base.slope,
         },
+        "lens_k": pile.lens,
         "contrast_levels": pile.contrast,
         "noise_levels": pile.noise,
         "profile": {

@@ -90,34 +90,38 @@ def flank_feet(flanks: tuple[FlankLine, FlankLine]) -> tuple[float, float]:
     return left.u[1] - left.z[1] / left.slope, right.u[1] + right.z[1] / right.slope
 
 
-def flank_lines(image: Image, pixel: float, lowest: float = 0.0) -> tuple[FlankLine | None, FlankLine | None]:
+def flank_lines(
+    image: Image, pixel: float, lowest: float = 0.0, window: tuple[float, float] = (FLOOR, CEILING)
+) -> tuple[FlankLine | None, FlankLine | None]:
     """The lines of the left and the right flank of a silhouette; None for a flank that cannot be fitted.
 
     ``image``: the pile alone (see :func:`~solver.observables.silhouette.largest_part`), row 0 on the plate;
     ``pixel`` [m]; ``lowest`` [m] raises the floor of the window to max(20 % of the height, ``lowest``), so
-    that a skirt one body thick stays out of the fit.
+    that a skirt one body thick stays out of the fit. ``window``: floor and ceiling, of the height.
     """
     tops = (column_tops(image) * pixel).astype(np.float64)
-    mirrored, right = _right_flank(tops[::-1], pixel, lowest), _right_flank(tops, pixel, lowest)
+    mirrored, right = (_right_flank(one, pixel, lowest, window) for one in (tops[::-1], tops))
     width = tops.size * pixel
     left = mirrored and FlankLine((width - mirrored.u[0], width - mirrored.u[1]), mirrored.z, mirrored.slope)
     return left, right
 
 
-def flank_angles_deg(image: Image, pixel: float, lowest: float = 0.0) -> tuple[float, float]:
+def flank_angles_deg(
+    image: Image, pixel: float, lowest: float = 0.0, window: tuple[float, float] = (FLOOR, CEILING)
+) -> tuple[float, float]:
     """Angles of :func:`flank_lines` [°]; NaN for a flank that cannot be fitted."""
-    left, right = (math.nan if line is None else line.angle_deg for line in flank_lines(image, pixel, lowest))
+    left, right = (math.nan if line is None else line.angle_deg for line in flank_lines(image, pixel, lowest, window))
     return left, right
 
 
-def _right_flank(tops: Array, pixel: float, lowest: float) -> FlankLine | None:
+def _right_flank(tops: Array, pixel: float, lowest: float, window: tuple[float, float]) -> FlankLine | None:
     """The line of the flank on the right of an outline ``tops`` [m], shape (columns,)."""
     if tops.size == 0:
         return None
     height = tops.max()
     # Tops are whole pixels: a billionth of the height keeps rounding from deciding whether a column is in.
     slack = 1e-9 * height
-    floor, ceiling = max(FLOOR * height, lowest) - slack, CEILING * height - slack
+    floor, ceiling = max(window[0] * height, lowest) - slack, window[1] * height - slack
     if not floor < ceiling:
         return None
     outer = int(np.flatnonzero(tops >= floor)[-1])

@@ -19,6 +19,7 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from solver.observables.silhouette import EIGHT_NEIGHBOURS
+from solver.photograph.support import severed
 
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.bool_]
@@ -131,9 +132,12 @@ def standing_parts(mask: Image) -> list[Image]:
     area[0] = 0
     hanging = np.unique(labels[0])
     large = [k for k in np.argsort(area)[::-1] if area[k] >= LEAST_AREA * mask.size]
-    standing = [k for k in large if k not in hanging]
+    whole = [(labels == k, k in hanging) for k in large]
+    cut = [(severed(part), part, hangs) for part, hangs in whole]
+    # A pile whose apex a funnel touches hangs from the top with it.
+    standing = [part if below is None else below for below, part, hangs in cut if below is not None or not hangs]
     # If only something that reaches the top is left, it is a pile that is cut there.
-    return [labels == k for k in (standing or large)]
+    return standing or [part for part, _ in whole]
 
 
 def _rim(shape: tuple[int, ...]) -> Image:

@@ -18,16 +18,20 @@ from solver.photograph.picture import NotAPile, Reason
 
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.bool_]
-Kind = Literal["plate", "foot", "given"]
+Kind = Literal["plate", "foot", "given", "support"]
 
 SHOULDER = 0.04
 """Share of the part's width, at either end, that is level where a plate shows beside the pile."""
+SLOPES = (0.08, 0.2)
+"""Most by which the rise over run of both ends differs, of a plate's and of one that goes on beyond the picture."""
 INNER = 0.10
 """Share of the part's width at either end where the pile is too thin to tell its foot."""
 REACH = 6
 """Pixels of the mask on either side of the rough line within which the edge is looked for."""
 MOST_SAG = 0.05
 """Depth of a bulging foot over its width; a round pile seen from 5° above has 0.044, which lowers 25° by 0.5°."""
+UNSEEN_ABOVE_DEG = 3.0
+"""How far above a plate a camera is taken to be at most, where no foot shows it."""
 MOST_TILT_DEG = 7.0
 BLOCK = 8.0
 
@@ -47,6 +51,8 @@ class BaseLine:
     left: float
     """x of the outermost columns that it was fitted to [px]."""
     right: float
+    above_deg: float = UNSEEN_ABOVE_DEG
+    """How far above the plate the camera may be (95 %), by the foot of the pile; nothing else tells it."""
 
     def at(self, x: Array) -> Array:
         """y [px] at ``x`` [px]."""
@@ -64,7 +70,7 @@ def rough_base_line(part: Image) -> BaseLine:
     rows, x = part.shape[0], columns.astype(np.float64)
     tops = part.argmax(axis=0)[columns].astype(np.float64) - 0.5
     bottoms = rows - part[::-1].argmax(axis=0)[columns] - 0.5
-    plate = _shoulders(x, tops, bottoms)
+    plate = _shoulders(x, tops, bottoms, bool(part[:, 0].any() and part[:, -1].any()))
     if plate is not None:
         return plate
     at_side = [side for side, column in (("left", 0), ("right", -1)) if part[:, column].any()]
@@ -73,7 +79,7 @@ def rough_base_line(part: Image) -> BaseLine:
         raise NotAPile(
             Reason.CUT_BY_FRAME,
             f"what stands out reaches the {where} edge of the picture, with no level plate on both sides of it; "
-            "show the whole pile, or state --baseline",
+            "show the whole pile, and the plate's edge from its level; or state --baseline",
         )
     return _foot(x, bottoms)
 
@@ -88,6 +94,7 @@ def sharp_base_line(grey: Array, rough: BaseLine, scale: float) -> BaseLine:
         rough.kind,
         (rough.left + 0.5) * scale - 0.5,
         (rough.right + 0.5) * scale - 0.5,
+        rough.above_deg,
     )
     width = start.right - start.left
     if rough.kind == "foot":
@@ -99,12 +106,13 @@ def sharp_base_line(grey: Array, rough: BaseLine, scale: float) -> BaseLine:
     y = start.at(x)[None, :] + depth[:, None]
     strip = ndimage.map_coordinates(grey, [y, np.broadcast_to(x, y.shape)], order=1, mode="nearest")
     # From outside the pile inward: outside is above a plate, and below a foot.
-    found = _crossings(*((strip, depth) if rough.kind == "plate" else (strip[::-1], depth[::-1])))
+    found = crossings(*((strip, depth) if rough.kind == "plate" else (strip[::-1], depth[::-1])))
     seen = np.isfinite(found)
     if seen.sum() < 8:
         # No edge of its own there: the rough line, to a pixel of the mask.
         return replace(start, slope_error=scale / width, offset_error=scale)
-    return _fitted(x[seen], (y[0] - depth[0])[seen] + found[seen], rough.kind, start.left, start.right)
+    fitted = _fitted(x[seen], (y[0] - depth[0])[seen] + found[seen], rough.kind, start.left, start.right)
+    return replace(fitted, above_deg=rough.above_deg)
 
 
 def given_base_line(left: float, right: float, columns: int) -> BaseLine:
@@ -123,8 +131,11 @@ def check_tilt(line: BaseLine) -> None:
         )
 
 
-def _shoulders(x: Array, tops: Array, bottoms: Array) -> BaseLine | None:
-    """The line through the tops of both ends, if these are level stretches of one line; None otherwise."""
+def _shoulders(x: Array, tops: Array, bottoms: Array, across: bool) -> BaseLine | None:
+    """The line through the tops of both ends, if these are level stretches of one line; None otherwise.
+
+    ``across``: they go on beyond both sides of the picture, as a plate does that a lens may bend.
+    """
     n = max(5, round(SHOULDER * x.size))
     if x.size < 6 * n:
         return None
@@ -133,7 +144,7 @@ def _shoulders(x: Array, tops: Array, bottoms: Array) -> BaseLine | None:
     own = [np.polyfit(x[side], tops[side], 1)[0] for side in (slice(0, n), slice(-n, None))]
     misses = np.abs(tops[ends] - slope * x[ends] - offset)
     # A level stretch misses by pixel steps and noise; a flank's foot slopes one way on the left, another on the right.
-    level = np.median(misses) < 1.0 and np.percentile(misses, 90) < 2.5 and abs(own[0] - own[1]) < 0.08
+    level = np.median(misses) < 1.0 and np.percentile(misses, 90) < 2.5 and abs(own[0] - own[1]) < SLOPES[across]
     thick = np.median((bottoms - tops)[ends]) >= 3.0
     if not (level and thick):
         return None
@@ -145,12 +156,12 @@ def _foot(x: Array, bottoms: Array) -> BaseLine:
     if x[inner].size < 5:
         raise NotAPile(Reason.TOO_SMALL, f"what stands out is {x.size} pixels wide in the reduced picture")
     fitted = _fitted(x[inner], bottoms[inner], "foot", float(x[0]), float(x[-1]))
-    _check_sag(x, bottoms)
-    return fitted
+    return replace(fitted, above_deg=_above_deg(x, bottoms))
 
 
-def _check_sag(x: Array, bottoms: Array) -> None:
-    """NotAPile where the foot bulges downward like the near half of a round base seen from above."""
+def _above_deg(x: Array, bottoms: Array) -> float:
+    """How far above the plate the camera may be (95 %): a round foot's near half bulges downward by sin of it, over its
+    width twice. NotAPile where it is too far."""
     u = (x - x.mean()) / (0.5 * max(x[-1] - x[0], 1.0))
     inner = np.abs(u) < 1.0 - INNER
     # Near half of an ellipse: y = line + sag √(1 − u²).
@@ -166,6 +177,11 @@ def _check_sag(x: Array, bottoms: Array) -> None:
             f"the foot of the pile bulges by {sag:.0%} of its width, as seen from {degrees:.0f}° above; "
             "bring the camera down to the plate",
         )
+    alone = terms[:, 2] - terms[:, :2] @ np.linalg.lstsq(terms[:, :2], terms[:, 2], rcond=None)[0]
+    miss = bottoms[inner] - terms @ coefficients
+    n = max(4.0, min(inner.sum() / BLOCK, 1.0 + int(np.count_nonzero(np.diff(np.signbit(miss))))))
+    error = np.hypot(bent_miss, 0.3) / np.sqrt(n) / float(np.std(alone)) / (x[-1] - x[0])
+    return float(np.degrees(np.arcsin(min(2.0 * MOST_SAG, 2.0 * max(sag, 0.0) + 4.0 * error))))
 
 
 def _fitted(x: Array, y: Array, kind: Kind, left: float, right: float) -> BaseLine:
@@ -191,7 +207,7 @@ def _fitted(x: Array, y: Array, kind: Kind, left: float, right: float) -> BaseLi
     return BaseLine(float(offset), float(slope), error / across, error, kind, left, right)
 
 
-def _crossings(into: Array, steps: Array) -> Array:
+def crossings(into: Array, steps: Array) -> Array:
     """Place among ``steps`` (depths,) where each column of ``into`` is first half-way; NaN where it never is.
 
     ``into`` (depths, columns) are grey levels from outside to inside. The levels of both sides are means over

@@ -28,6 +28,12 @@ LEAST_EDGE = 6.0
 WIDEST_EDGE = 0.25
 FAINT = 0.3
 """Contrast of the edge where it is faintest, over the usual one."""
+MOST_BELOW = 0.1
+"""Of the height, by which the flanks may go on below the base line."""
+MOST_BEND_DEG = 4.0
+"""Standard deviation of the slopes of the thirds of a flank beyond that of bodies."""
+DRAWN_NOISE, DRAWN_SHARE, DRAWN_MISS = 0.05, 0.995, 0.45
+"""A drawing: grey levels of noise, share of one grey level on either side, pixels by which the flanks miss a line."""
 MOST_ROUGHNESS = 0.30
 """Root mean square distance of the outline from its line, over the height of the window: nothing heaped is rougher."""
 
@@ -127,6 +133,51 @@ def check_flanks(
     assert left is not None
     assert right is not None
     return left, right
+
+
+def check_below(share: float) -> None:
+    """NotAPile where the flanks go on below the base line by ``share`` of the height."""
+    if share > MOST_BELOW:
+        raise NotAPile(
+            Reason.CAMERA_LOOKS_DOWN,
+            f"the flanks go on below the base line, by {share:.0%} of the height at least: the plate is seen from "
+            "above and its edge lies behind the pile; bring the camera down to the plate, or state --baseline",
+        )
+
+
+def check_bend(thirds_deg: Sequence[Sequence[float]], bend_deg: Sequence[float]) -> None:
+    """NotAPile where a flank's thirds (left, right; each from below) differ by more than bodies and a natural bend."""
+    for side, thirds, bend in zip(("left", "right"), thirds_deg, bend_deg, strict=True):
+        if bend > MOST_BEND_DEG:
+            lower, middle, upper = thirds
+            cause = (
+                "a body under the pile, or a spread foot; state where the pile's foot is by --baseline"
+                if abs(lower - middle) >= abs(upper - middle) or not np.isfinite(lower)
+                else "a funnel's tip or a round top; take it away, or show the flanks alone"
+            )
+            words = ", ".join("none" if not np.isfinite(one) else f"{one:.0f}°" for one in thirds)
+            raise NotAPile(
+                Reason.BENT_FLANK,
+                f"the {side} flank has no one slope: {words} in its lower, middle and upper third, more than bodies "
+                f"give; {cause}",
+            )
+
+
+def check_photographed(noise: float, inside: Array, outside: Array, roughness: float) -> None:
+    """NotAPile for a drawing: two flat tones with no noise at all, and flanks (``roughness`` [px]) straight to a pixel.
+
+    A photograph has noise, and one that was made black and white has the outline of bodies.
+    """
+    flat = all(
+        one.size > 0 and np.unique(one, return_counts=True)[1].max() >= DRAWN_SHARE * one.size
+        for one in (inside, outside)
+    )
+    if noise <= DRAWN_NOISE and flat and roughness <= DRAWN_MISS:
+        raise NotAPile(
+            Reason.DRAWN,
+            "both sides of the edge have one grey level without noise, and the flanks are straight to a pixel: no "
+            "photograph of a pile has that",
+        )
 
 
 def check_levels(shift_deg: float) -> None:

@@ -21,6 +21,8 @@ from solver.photograph.picture import NotAPile, Reason
 Array = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
 
+IN_FRONT = 0.04
+"""Of the width of a pile: its foot lies by so much before a plate's edge behind it."""
 ROUGH = 600
 """Longest side of the reduced picture [px]."""
 
@@ -54,8 +56,11 @@ def find_pile(grey: npt.NDArray[np.float32], given: BaseLine | None) -> tuple[Fo
 
 
 def _clearest(small: Array, light: Illumination, found: Sequence[Candidate], given: BaseLine | None) -> Found:
-    """The candidate with the sharpest flanks among those that stand; the first one's reason where none does."""
-    reasons: list[tuple[int, NotAPile]] = []
+    """The candidate with the sharpest flanks among those that stand.
+
+    NotAPile where none does, by the reason of the largest, and wherever a foot shows that it is seen from above.
+    """
+    reasons: list[tuple[Bool, NotAPile]] = []
     standing: list[Found] = []
     for candidate in found:
         try:
@@ -66,15 +71,27 @@ def _clearest(small: Array, light: Illumination, found: Sequence[Candidate], giv
             difference = float(np.median(np.abs(small - light.surface)[candidate.part]))
             standing.append(Found(candidate, line, _sharpness(small, candidate.part, line), difference))
         except NotAPile as reason:
-            reasons.append((int(candidate.part.sum()), reason))
-    if standing:
-        return max(standing, key=lambda one: one.sharpness)
+            reasons.append((candidate.part, reason))
+    best = max(standing, key=lambda one: one.sharpness, default=None)
+    for part, why in reasons:
+        if why.reason == Reason.CAMERA_LOOKS_DOWN and (best is None or _in_front(part, best)):
+            raise why
+    if best is not None:
+        return best
     if reasons:
-        raise max(reasons, key=lambda one: one[0])[1]
+        raise max(reasons, key=lambda one: int(one[0].sum()))[1]
     raise NotAPile(
         Reason.NO_CLEAR_SILHOUETTE,
         "no connected part stands out from the backdrop; use an even backdrop of another grey than the pile",
     )
+
+
+def _in_front(part: Bool, best: Found) -> bool:
+    """Whether the foot of ``part`` lies before the plate's edge on which the ``best`` part seems to stand."""
+    columns = np.flatnonzero(part.any(axis=0))
+    lowest = part.shape[0] - 1 - part[::-1].argmax(axis=0)[columns]
+    below = lowest - best.line.at(columns.astype(np.float64))
+    return best.line.kind == "plate" and float(below.max()) > IN_FRONT * columns.size
 
 
 def _sharpness(small: Array, part: Bool, line: BaseLine) -> float:

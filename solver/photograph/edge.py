@@ -11,12 +11,13 @@ How well the edge shows: its contrast, the noise, the width of the change, and h
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from solver.observables.repose import FLOOR, FlankLine, Outline
+from solver.observables.repose import CEILING, FLOOR, FlankLine, Outline
 from solver.observables.silhouette import largest_part
 from solver.photograph.backdrop import NORMAL
 from solver.photograph.base_line import BaseLine
@@ -39,6 +40,15 @@ NEIGHBOURHOOD = 0.06
 """Side of the square, over the width of the patch, in which the means of both sides are taken."""
 LEVELS = (0.35, 0.5, 0.65)
 """Where between outside (0) and inside (1) the edge is put: the middle one counts, the others show how sharp it is."""
+BELOW = (0.04, 0.09, 0.14, 0.19, 0.24)
+"""Shares of the height below the base line between which the flanks are looked for there."""
+BESIDE = 5.0
+"""Pixels on either side of them."""
+LEAST_STRETCH = 4
+SURE_BELOW, LEAST_BELOW = 4.0, 4.0
+"""Standard errors, and grey levels, by which the grey changes sides where a flank goes on."""
+NEAR_TOP = 0.95
+"""Of the height, above which a pile is round."""
 SPAN = 0.06
 """Share of the height, over which the change of the grey across the edge is taken."""
 
@@ -127,6 +137,13 @@ def silhouettes(patch: Patch, noise: float) -> Silhouettes:
     return Silhouettes(tuple(images), inside, outside)
 
 
+def both_sides(patch: Patch) -> tuple[Array, Array]:
+    """Grey levels of the pile and of what is about it, away from the edge."""
+    depth = ndimage.distance_transform_edt(np.pad(patch.rough, ((1, 0), (0, 0))))[1:]
+    off = ndimage.distance_transform_edt(~patch.rough)
+    return patch.grey[depth > 2.0 * patch.band].round(), patch.grey[off > 2.0 * patch.band].round()
+
+
 def pixel_noise(grey: Array) -> float:
     """Standard deviation of a pixel of ``grey``, from second differences along the rows, which slanting light does not
     touch: median, so that edges and the pile do not count. Over one pixel and over eight, the block of a JPEG, within
@@ -146,16 +163,58 @@ def edge_contrast(patch: Patch, seen: Silhouettes, tops: Array) -> float:
 
 
 def faintest(patch: Patch, seen: Silhouettes, tops: Array) -> float:
-    """The same at its faintest stretch, a twentieth of the pile wide, from the top down to the ends of the window."""
-    columns = np.flatnonzero(tops >= FLOOR * tops.max())
+    """The same at its faintest stretch, a twentieth of the pile wide, over the window of the fit: above it may
+    have been a funnel's tip."""
+    columns = np.flatnonzero((tops >= FLOOR * tops.max()) & (tops <= CEILING * tops.max()))
     share = max(3, columns.size // 20)
     faint = []
-    for side in (columns[columns <= tops.argmax()][::-1], columns[columns >= tops.argmax()]):
+    for side in (columns[columns < tops.argmax()][::-1], columns[columns > tops.argmax()]):
+        if side.size == 0:
+            continue
         rows = np.clip(tops[side].astype(np.int64) - 1, 0, patch.grey.shape[0] - 1)
         contrast = np.abs(seen.inside - seen.outside)[rows, side]
         # At its very end the side of a pile may be a drop: the levels there are of what stands before and behind it.
         faint.append(float(ndimage.median_filter(contrast, share, mode="nearest").min()))
-    return min(faint)
+    return min(faint, default=0.0)
+
+
+def goes_on_below(grey: Array, patch: Patch, flanks: tuple[FlankLine, FlankLine], height: float) -> float:
+    """How far the flanks of a pile of ``height`` [pixels of the patch] go on below the base line, over the height; 0
+    where they end there.
+
+    Along the lines that go on from the ``flanks`` the grey just inside is compared with that just outside, both
+    as means over stretches: where it changes in the same sense on both of them the pile goes on, as it does on a plate
+    that is seen from above and begins behind it.
+    """
+    width = BESIDE / patch.step
+    reach = 0.0
+    for low, high in pairwise(BELOW):
+        # Above the base line lies the backdrop.
+        depth = np.arange(max(low * height, width + 2.0), high * height)
+        if depth.size < LEAST_STRETCH:
+            continue
+        changes = []
+        for flank, outward in zip(flanks, (-1.0, 1.0), strict=True):
+            slant = np.arctan(flank.slope)
+            foot = flank.u[1] + outward * flank.z[1] / flank.slope
+            off = np.concatenate([-np.linspace(width / 3.0, width, 6), np.linspace(width / 3.0, width, 6)])
+            column = foot + outward * (depth[:, None] / flank.slope + np.sin(slant) * off)
+            z = np.cos(slant) * off - depth[:, None]
+            x = patch.foot[0] + patch.step * (patch.along[0] * column + patch.along[1] * z)
+            y = patch.foot[1] + patch.step * (patch.along[1] * column - patch.along[0] * z)
+            if x.min() < 0 or y.min() < 0 or x.max() > grey.shape[1] - 1 or y.max() > grey.shape[0] - 1:
+                return reach
+            seen = ndimage.map_coordinates(grey, [y, x], order=1)
+            change = seen[:, 6:].mean(axis=1) - seen[:, :6].mean(axis=1)
+            changes.append(
+                (float(change.mean()), float(change.std()) / np.sqrt(max(depth.size * patch.step / 4.0, 1.0)))
+            )
+        (left, left_error), (right, right_error) = changes
+        sure = abs(left) > SURE_BELOW * left_error and abs(right) > SURE_BELOW * right_error
+        if not (left * right > 0.0 and sure and min(abs(left), abs(right)) > LEAST_BELOW):
+            break
+        reach = high
+    return reach
 
 
 def edge_width(patch: Patch, tops: Array, difference: float) -> float:
@@ -202,7 +261,7 @@ def _mean_where(values: Array, where: Image, side: int) -> Array:
 
 
 def _flank_columns(tops: Array) -> npt.NDArray[np.intp]:
-    columns = np.flatnonzero((tops > 0.2 * tops.max()) & (tops < 0.95 * tops.max()))
+    columns = np.flatnonzero((tops > 0.2 * tops.max()) & (tops < NEAR_TOP * tops.max()))
     if columns.size == 0:
         raise NotAPile(Reason.NO_FLANK, "what stands out has no slope on either side")
     return columns

@@ -9,6 +9,7 @@ Where a picture gives no angle, a name and a sentence say why, in place of a num
 
 from __future__ import annotations
 
+import math
 import warnings
 from dataclasses import dataclass
 from enum import StrEnum
@@ -16,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image, ImageOps, UnidentifiedImageError
+from PIL import ExifTags, Image, ImageOps, UnidentifiedImageError
 
 Grey = npt.NDArray[np.float32]
 
@@ -27,6 +28,10 @@ LEAST_SIDE = 32
 LONGEST = 2400
 """Longest side [px] that is worked on: an angle gains nothing from more."""
 WHITE = 255.0
+FILM_DIAGONAL = math.hypot(36.0, 24.0)
+"""Of a frame of 35 mm film [mm]."""
+MOST_FOCAL = 5000
+"""A longer one is no focal length [mm]."""
 
 
 class PhotographError(ValueError):
@@ -45,6 +50,8 @@ class Picture:
     height: int
     reduced: int
     """Pixels of the picture along a side of one of ``grey``."""
+    focal: float | None = None
+    """Focal length [px of the picture], where the file tells that of 35 mm film with the same diagonal."""
 
     def place(self, index: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Coordinates in the picture of coordinates in ``grey`` (middles of pixels at whole numbers)."""
@@ -66,6 +73,9 @@ class Reason(StrEnum):
     TILTED_CAMERA = "tilted camera"
     CAMERA_LOOKS_DOWN = "camera looks down"
     NO_FLANK = "no flank"
+    BENT_FLANK = "bent flank"
+    SUPPORT = "a body under the pile"
+    DRAWN = "a drawing"
     NO_SCALE = "no reference length"
 
 
@@ -120,7 +130,14 @@ def _decoded(path: Path, image: Image.Image) -> Picture:
     reduced = max(1, -(-max(columns, rows) // LONGEST))
     seen = Image.fromarray(_grey(ImageOps.exif_transpose(image), path))
     small = seen.reduce(reduced) if reduced > 1 else seen
-    return Picture(path.name, np.array(small, dtype=np.float32), seen.width, seen.height, reduced)
+    focal = _film_focal(image) * math.hypot(columns, rows) / FILM_DIAGONAL
+    return Picture(path.name, np.array(small, dtype=np.float32), seen.width, seen.height, reduced, focal or None)
+
+
+def _film_focal(image: Image.Image) -> float:
+    """Focal length for 35 mm film that a camera noted beside ``image`` [mm]; 0 where none did."""
+    noted = image.getexif().get_ifd(ExifTags.IFD.Exif).get(ExifTags.Base.FocalLengthIn35mmFilm, 0)
+    return float(noted) if isinstance(noted, int) and 0 < noted < MOST_FOCAL else 0.0
 
 
 def _grey(image: Image.Image, path: Path) -> Grey:

@@ -1,6 +1,7 @@
 """A photograph of a pile → its outline and flank lines, by the function that reads simulated piles.
 
-    grey levels → light of the backdrop → masks and their parts → base line → upright silhouette → flank lines
+    grey levels → light of the backdrop → masks and their parts → base line → the picture without the lens's bend →
+    upright silhouette, above what has the pile's tone under it → flank lines, and by thirds
 
 The picture is one view along the plate, by a camera that is far away, level and no higher than the plate. Lengths are
 in metres where the scale of the picture is known, in its pixels elsewhere.
@@ -8,7 +9,7 @@ in metres where the scale of the picture is known, in its pixels elsewhere.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -16,24 +17,31 @@ import numpy.typing as npt
 
 from solver.observables.repose import FlankLine, Outline, flank_feet, outline_of
 from solver.observables.silhouette import column_tops
-from solver.photograph import checks
+from solver.photograph import checks, lens
 from solver.photograph.base_line import BaseLine, check_tilt, given_base_line, sharp_base_line
-from solver.photograph.clearest import find_pile
+from solver.photograph.clearest import Found, find_pile
 from solver.photograph.edge import (
     Patch,
+    Silhouettes,
+    both_sides,
     edge_contrast,
     edge_width,
     faintest,
+    goes_on_below,
     pixel_noise,
     roughness,
     silhouettes,
     upright,
 )
 from solver.photograph.picture import NotAPile, Picture, Reason, Refusal
-from solver.photograph.reading_error import Angles, angles_of
+from solver.photograph.reading_error import UNSEEN_NEAR, Angles, View, angles_of
+from solver.photograph.support import Support, support_under
 
 Array = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
+
+MOST_SUPPORTS = 3
+"""Bodies under each other: a disc on a plate on a table."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +68,10 @@ class PhotographedPile:
     """Grey levels between both sides of the flanks, of 255."""
     noise: float
     """Standard deviation of a pixel, in grey levels."""
+    size: tuple[int, int]
+    """Of the picture [px]: columns, rows."""
+    lens: float = 0.0
+    """k of the lens that was taken out of the picture (`lens.py`), on whose straight copy all lines are; 0: none."""
 
     @property
     def flanks(self) -> tuple[FlankLine, FlankLine]:
@@ -74,7 +86,15 @@ class PhotographedPile:
         along = np.array([1.0, self.base.slope]) / np.hypot(1.0, self.base.slope)
         x = self.origin[0] + (along[0] * u + along[1] * z) / self.pixel
         y = self.origin[1] + (along[1] * u - along[0] * z) / self.pixel
-        return x, y
+        return self.as_seen(x, y)
+
+    def as_seen(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Where in the picture places [px] of its straight copy are."""
+        if self.lens == 0.0:
+            return x, y
+        u, v, half = lens.centred(x, y, self.size[::-1])
+        u, v = lens.bent(u, v, self.lens)
+        return u * half + 0.5 * (self.size[0] - 1), v * half + 0.5 * (self.size[1] - 1)
 
 
 def read_photograph(
@@ -92,44 +112,52 @@ def read_photograph(
 
 
 def _read(picture: Picture, metres_per_pixel: float | None, base_line: tuple[float, float] | None) -> PhotographedPile:
-    grey = picture.grey.astype(np.float64)
-    given = None
     if base_line is not None:
         left, right = picture.index(np.array(base_line))
-        given = given_base_line(float(left), float(right), grey.shape[1])
-    found, scale = find_pile(picture.grey, given)
-    line = given or sharp_base_line(grey, found.line, scale)
-    check_tilt(line)
-    patch = upright(grey, found.candidate.part, line, scale)
-    return _measured(picture, patch, line, pixel_noise(grey), found.difference, metres_per_pixel)
+        given = given_base_line(float(left), float(right), picture.grey.shape[1])
+        found, scale = find_pile(picture.grey, given)
+        return _measured(picture, found, scale, given, lens.UNKNOWN, metres_per_pixel)
+    found, scale = find_pile(picture.grey, None)
+    grey = picture.grey.astype(np.float64)
+    line = sharp_base_line(grey, found.line, scale)
+    bend = lens.bend_of(grey, found.candidate.part, line, scale)
+    if not bend.sure:
+        return _measured(picture, found, scale, line, bend, metres_per_pixel)
+    picture = lens.straightened(picture, bend.k)
+    found, scale = find_pile(picture.grey, None)
+    line = sharp_base_line(picture.grey.astype(np.float64), found.line, scale)
+    pile = _measured(picture, found, scale, line, replace(bend, k=0.0), metres_per_pixel)
+    return replace(pile, lens=bend.k)
 
 
 def _measured(
-    picture: Picture,
-    patch: Patch,
-    line: BaseLine,
-    noise: float,
-    difference: float,
-    metres_per_pixel: float | None,
+    picture: Picture, found: Found, scale: float, line: BaseLine, bend: lens.Bend, metres_per_pixel: float | None
 ) -> PhotographedPile:
-    seen = silhouettes(patch, noise)
+    check_tilt(line)
+    grey = picture.grey.astype(np.float64)
+    noise = pixel_noise(grey)
+    patch, seen, tops, line = _standing(grey, found, line, scale, noise)
     image = seen.images[1]
-    if not image.any():
-        raise NotAPile(Reason.NO_CLEAR_SILHOUETTE, "nothing stands above the base line")
-    tops = column_tops(image).astype(np.float64)
     unit_pixel = 1.0 if metres_per_pixel is None else metres_per_pixel
     side = patch.step * picture.reduced
     checks.check_size(float(tops.max()) * side)
+    in_patch = outline_of(image, 0.0, 0.0, 1.0)
+    if line.kind == "plate" and all(in_patch.flanks):
+        sloping = checks.check_flanks(in_patch.flanks, (0.0, 0.0), float(tops.max()))
+        checks.check_below(goes_on_below(grey, patch, sloping, float(tops.max())))
     contrast = edge_contrast(patch, seen, tops)
     checks.check_edge(contrast, faintest(patch, seen, tops), noise)
-    checks.check_sharp(edge_width(patch, tops, difference), float(tops.max()))
+    checks.check_sharp(edge_width(patch, tops, found.difference), float(tops.max()))
     checks.check_one_heap(tops)
-    in_patch = outline_of(image, 0.0, 0.0, 1.0)
     rough = (roughness(in_patch, in_patch.flanks[0]), roughness(in_patch, in_patch.flanks[1]))
     flanks = checks.check_flanks(in_patch.flanks, rough, float(tops.max()))
-    angles = angles_of(seen, flanks, patch.step, line, min(noise / max(contrast, 1.0), 0.125))
-    checks.check_levels(angles.level_shift_deg)
+    checks.check_photographed(noise, *both_sides(patch), max(rough) * patch.step)
     feet = flank_feet(flanks)
+    near = UNSEEN_NEAR if picture.focal is None else 0.5 * (feet[1] - feet[0]) * side / picture.focal
+    view = View(_lens_deg(grey, patch, tops, flanks, bend.left_over), line.above_deg, near)
+    angles = angles_of(seen, flanks, patch.step, line, min(noise / max(contrast, 1.0), 0.125), view)
+    checks.check_levels(angles.level_shift_deg)
+    checks.check_bend([angles.left.thirds_deg, angles.right.thirds_deg], angles.bend_deg)
     middle = 0.5 * (feet[0] + feet[1])
     place = np.array(patch.foot) + np.array(patch.along) * middle * patch.step
     origin = picture.place(place)
@@ -148,7 +176,80 @@ def _measured(
         origin=(float(origin[0]), float(origin[1])),
         contrast=contrast,
         noise=noise,
+        size=(picture.width, picture.height),
     )
+
+
+def _standing(
+    grey: Array, found: Found, line: BaseLine, scale: float, noise: float
+) -> tuple[Patch, Silhouettes, Array, BaseLine]:
+    """The pile upright on ``line``, or on the top of what stands on it in the pile's tone, with its silhouettes and its
+    heights per column."""
+    for _ in range(MOST_SUPPORTS):
+        patch = upright(grey, found.candidate.part, line, scale)
+        seen = silhouettes(patch, noise)
+        if not seen.images[1].any():
+            raise NotAPile(Reason.NO_CLEAR_SILHOUETTE, "nothing stands above the base line")
+        tops = column_tops(seen.images[1]).astype(np.float64)
+        under = None if line.kind == "given" else support_under(tops, 1.0 / patch.step)
+        if under is None:
+            return patch, seen, tops, line
+        line = _on(under, patch)
+        check_tilt(line)
+    raise NotAPile(Reason.SUPPORT, "what stands out is a stack of bodies; state where the pile's foot is by --baseline")
+
+
+def _on(under: Support, patch: Patch) -> BaseLine:
+    """The top of what is ``under`` the pile, as its base line."""
+    ends = np.array([under.left, under.right])
+    z = under.height + under.slope * ends
+    x = patch.foot[0] + patch.step * (patch.along[0] * ends + patch.along[1] * z)
+    y = patch.foot[1] + patch.step * (patch.along[1] * ends - patch.along[0] * z)
+    slope = float((y[1] - y[0]) / (x[1] - x[0]))
+    return BaseLine(
+        float(y[0] - slope * x[0]),
+        slope,
+        under.slope_error,
+        under.error * patch.step,
+        "support",
+        float(x[0]),
+        float(x[1]),
+    )
+
+
+def _lens_deg(
+    grey: Array, patch: Patch, tops: Array, flanks: tuple[FlankLine, FlankLine], k_error: float
+) -> tuple[float, float]:
+    """By how much a lens of ``k_error`` turns the flank lines against the base line [°]."""
+
+    def angles(k: float) -> Array:
+        found = []
+        for flank in flanks:
+            inner, outer = sorted(flank.u)
+            column = np.arange(int(inner), int(outer) + 1)
+            found.append(
+                _directions(patch, column.astype(np.float64) + 0.5, tops[column], flank_feet(flanks), grey.shape, k)
+            )
+        return np.array(found)
+
+    step = 0.01
+    turned = np.abs(angles(step) - angles(-step)) / (2.0 * step) * k_error
+    return float(turned[0]), float(turned[1])
+
+
+def _directions(
+    patch: Patch, column: Array, z: Array, feet: tuple[float, float], shape: tuple[int, ...], k: float
+) -> float:
+    """Angle [°] of the line through columns and heights of the patch against the base line, without a bend of ``k``."""
+    u = np.concatenate([column, feet])
+    v = np.concatenate([z, [0.0, 0.0]])
+    x = patch.foot[0] + patch.step * (patch.along[0] * u + patch.along[1] * v)
+    y = patch.foot[1] + patch.step * (patch.along[1] * u - patch.along[0] * v)
+    a, b, _ = lens.centred(x, y, shape)
+    a, b = lens.straight(a, b, k)
+    flank = np.polyfit(a[:-2], b[:-2], 1)[0]
+    base = (b[-1] - b[-2]) / (a[-1] - a[-2])
+    return float(np.degrees(np.arctan(flank) - np.arctan(base)))
 
 
 def _in_picture(line: BaseLine, picture: Picture, y_left: float, y_right: float) -> BaseLine:

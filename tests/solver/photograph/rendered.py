@@ -91,10 +91,21 @@ def photograph(cover, look):
     if look.plate is not None:
         on_plate = np.clip(0.5 - z, 0.0, 1.0)
         ground = ground * (1.0 - on_plate) + look.plate * on_plate
+    body = look.pile * (1.0 - look.shading * np.clip(0.5 + 4.0 * u / columns, 0.0, 1.0)) + texture(look, rng)
+    return developed(pile * body + (1.0 - pile) * ground, look, rng)
+
+
+def texture(look, rng):
+    """Grey levels of the pile's own pattern, shape of the picture."""
+    columns, rows = look.width, round(0.62 * look.width)
     grain = rng.normal(size=(rows // max(1, columns // 100) + 2, columns // max(1, columns // 100) + 2))
-    texture = look.texture * ndimage.zoom(grain, max(1, columns // 100), order=1)[:rows, :columns]
-    body = look.pile * (1.0 - look.shading * np.clip(0.5 + 4.0 * u / columns, 0.0, 1.0)) + texture
-    grey = pile * body + (1.0 - pile) * ground
+    return look.texture * ndimage.zoom(grain, max(1, columns // 100), order=1)[:rows, :columns]
+
+
+def developed(grey, look, rng):
+    """``grey`` as it comes out of the camera: the light on it, blur, noise, 8 bit, the codec."""
+    rows, columns = grey.shape
+    x, y = np.meshgrid(np.arange(columns) - (columns - 1) / 2, np.arange(rows) - look.base * rows)
     light = (1.0 + look.slant * x / columns) * (1.0 - look.falloff * ((x / columns) ** 2 + (y / columns) ** 2) * 2.0)
     grey = ndimage.gaussian_filter(grey * light, look.blur)
     grey = np.clip(grey + rng.normal(scale=look.noise, size=grey.shape), 0, 255).round().astype(np.uint8)

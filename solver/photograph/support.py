@@ -1,0 +1,133 @@
+"""What a pile of one tone with it stands on, and what stands in its apex: a disc, a tray's rim, a dish; a funnel's tip.
+
+To the silhouette they are one body with the pile, so that its base line lies too low or its top too high. Both show in
+how far the outline reaches at each height: on a body under the pile it leaps outward at one height on both sides, and
+goes straight down from there; at a funnel's tip it is as wide over a long stretch, and widens below.
+
+To a silhouette a gable on a house is a pile on a block: nothing tells them apart, and it is cut in the same way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Image = npt.NDArray[np.bool_]
+
+SHARP = 0.012
+"""Of the height: within twice as much the outline leaps from the pile out to the end of what is under it."""
+LEAP = 0.06
+"""Of how far the pile reaches there: a smaller leap is of bodies, or of a rounded foot."""
+BOTH = 1.7
+"""Times that on the mean of both sides: the pile may stand near one end."""
+SLACK = 3.0
+"""Pixels of the picture that a leap has at least."""
+SIDE = (0.25, 0.8)
+"""Shares of its height between which the side of a body under the pile goes straight down; that of bodies is round."""
+UPRIGHT, LEAST_UPRIGHT = 0.07, 1.2
+"""Over that height, and pixels of the picture, by which it may grow there: a sphere's grows by 0.1 of it."""
+LOWEST, HIGHEST = 0.05, 0.75
+"""Of the height, between which a body under the pile ends."""
+LEAST_HIGH = 10.0
+"""Pixels of the picture: of a layer of bodies that is no higher it cannot be seen that it is none."""
+EVEN = 0.15
+"""Rise over run by which the top of a body under the pile may slope."""
+FLAT, ROUND = 1.0, 0.003
+"""Pixels of the picture, and share of the height, by which it may miss a line (root mean square)."""
+NECK, STEADY = 1.25, 0.9
+"""Width of the end of a tip over that where it is thinnest, and of its beginning over that."""
+LEAST_NECK = 0.15
+"""Of the height: a body that sticks out of the apex is shorter."""
+THINNEST = 0.3
+"""Of the width of the pile: a tip is thinner."""
+
+
+@dataclass(frozen=True)
+class Support:
+    """The top of a body under the pile, in pixels of the outline: z = height + slope · (column + 1/2)."""
+
+    height: float
+    slope: float
+    slope_error: float
+    error: float
+    """Standard error of its height."""
+    left: float
+    right: float
+    """Ends of its top."""
+
+
+def support_under(tops: Array, pixel: float) -> Support | None:
+    """The body on which the pile of an outline of heights ``tops`` stands; None where the outline shows none.
+
+    ``pixel``: how many of the outline's there are in one of the picture. Something on one side only is none: bodies
+    make such corners as well.
+    """
+    height = float(tops.max())
+    apex = int(tops.argmax())
+    reach = np.stack([_reach(tops[apex::-1], height), _reach(tops[apex:], height)])
+    half = max(2, round(2.0 * pixel), round(SHARP * height))
+    z = np.arange(round(max(LOWEST * height, LEAST_HIGH * pixel, half + 1)), round(HIGHEST * height))
+    if z.size == 0 or height < 8 * half:
+        return None
+    over = np.minimum(z + half + round(0.2 * height), int(height) - 1)
+    grown = (reach[:, z + half] - reach[:, over]) / np.maximum(over - z - half, 1)
+    leap = reach[:, z - half] - reach[:, z + half] - 2.0 * half * 1.5 * grown
+    low, high = (np.round(share * z).astype(np.int64) for share in SIDE)
+    upright = reach[:, low] - reach[:, high] <= np.maximum(UPRIGHT * z, LEAST_UPRIGHT * pixel)
+    size = leap / np.maximum(LEAP * reach[:, z + half], SLACK * pixel)
+    size = np.where(upright, size, 0.0)
+    both = np.flatnonzero((size.min(axis=0) >= 1.0) & (size.mean(axis=0) >= BOTH))
+    # The highest one: what is under it is looked for again from there.
+    for k in both[::-1]:
+        found = _top(tops, apex, reach[:, z[k] + half], reach[:, z[k] - half], pixel)
+        if found is not None:
+            best = k - int(size.min(axis=0)[max(0, k - 2 * half) : k + 1][::-1].argmax())
+            return _top(tops, apex, reach[:, z[best] + half], reach[:, z[best] - half], pixel) or found
+    return None
+
+
+def severed(part: Image) -> Image | None:
+    """``part`` of a mask (row 0 on top) without the funnel or rod whose tip is in its apex; None without one."""
+    rows = np.flatnonzero(part.any(axis=1))
+    left, right = part.argmax(axis=1)[rows], part.shape[1] - 1 - part[:, ::-1].argmax(axis=1)[rows]
+    width = (right - left + 1).astype(np.float64)
+    widest = int(width[rows.size // 4 :].argmax()) + rows.size // 4
+    long = max(4, round(LEAST_NECK * rows.size))
+    # A cone is narrower by a tenth of its width so much higher up; a tip is not.
+    tip = np.flatnonzero((width[:-long] >= STEADY * width[long:]) & (width[long:] <= THINNEST * width[widest])) + long
+    tip = tip[tip < widest]
+    if tip.size == 0:
+        return None
+    last = int(np.flatnonzero(width[:widest] <= NECK * width[tip[-1] - long : tip[-1] + 1].min())[-1])
+    if last + 8 > rows.size:
+        return None
+    cut = part.copy()
+    cut[: rows[last] + 1] = False
+    return cut
+
+
+def _reach(tops: Array, height: float) -> Array:
+    """Columns from the first of ``tops`` to the last one that is so high, per height 0, 1, …, shape (height,)."""
+    envelope = np.maximum.accumulate(tops[::-1])[::-1]
+    return np.searchsorted(-envelope, -np.arange(int(height), dtype=np.float64), side="right").astype(np.float64) - 1.0
+
+
+def _top(tops: Array, apex: int, inner: Array, outer: Array, pixel: float) -> Support | None:
+    """The line through the tops of the columns between ``inner`` and ``outer`` reach (left, right); None where they are
+    on no line: bodies are round."""
+    blur = round(2.0 * pixel)
+    left = np.arange(apex - int(outer[0]) + blur, apex - int(inner[0]) - blur)
+    right = np.arange(apex + int(inner[1]) + blur + 1, apex + int(outer[1]) - blur + 1)
+    if min(left.size, right.size) < 3:
+        return None
+    columns = np.concatenate([left, right])
+    slope, height = np.polyfit(columns + 0.5, tops[columns], 1)
+    miss = tops[columns] - slope * (columns + 0.5) - height
+    if abs(slope) > EVEN or float(np.sqrt(np.mean(miss**2))) > max(FLAT * pixel, ROUND * float(tops.max())):
+        return None
+    error = float(np.sqrt(np.mean(miss**2) + 0.25) / np.sqrt(max(4.0, columns.size / 8.0)))
+    ends = float(apex - outer[0]), float(apex + outer[1])
+    return Support(float(height), float(slope), error / float(np.std(columns)), error, *ends)
