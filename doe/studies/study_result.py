@@ -120,6 +120,10 @@ class Stages(Record):
             return ()
         return (found.runs,) if isinstance(found, VerificationResult) else found.runs
 
+    def own_runs_of(self, stage: str) -> tuple[Run, ...]:
+        """Return the runs of a stage in the study's own rig."""
+        return tuple(run for runs in self.runs_of(stage) for run in runs if not run.experiment)
+
     def settings_of(self, stage: str) -> tuple[Setting, ...]:
         """Return the settings of a stage, in the order of ``runs_of``; empty also of results of older versions."""
         found = self.result_of(stage)

@@ -136,6 +136,7 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
             observer=recorder,
             pours=pool.run_queue if pool else None,
             tries=order.tries,
+            experiments=study.experiments,
         )
         bias = estimator_bias(study.estimators)
         found = run_campaign(study, profile, runner, bias, progress.stage, follower.begin, partial.keep)
@@ -158,8 +159,8 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
 def poured_piles(stages: Stages, store: Store) -> tuple[PouredPile, ...]:
     """Mean silhouettes at the reference setting and at the optimum, read off the stored pours; none that are lost."""
     chosen = (
-        ("reference", [run for runs in stages.runs_of("pilot") for run in runs if run.label == REFERENCE]),
-        ("optimum", [run for runs in stages.runs_of("verification") for run in runs]),
+        ("reference", [run for run in stages.own_runs_of("pilot") if run.label == REFERENCE]),
+        ("optimum", stages.own_runs_of("verification")),
     )
     seen = [
         (name, [views for run in runs if run.valid and (views := _silhouettes(store.find(run.key)))])

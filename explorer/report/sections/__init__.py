@@ -7,7 +7,7 @@ from collections.abc import Callable
 from doe.studies.study_result import StudyResult
 from explorer.report.content import Section
 from explorer.report.methods import study_methods
-from explorer.report.sections.answer import effects, optimum, overview, parameters, piles, verification
+from explorer.report.sections.answer import effects, overview, parameters, piles, verification
 from explorer.report.sections.closing import further, paper, repeat, runs
 from explorer.report.sections.designs import assumptions, noise, scan, screening
 from explorer.report.sections.surface import ascent, surface
