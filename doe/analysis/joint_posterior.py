@@ -2,10 +2,12 @@
 
     p(x | T) ∝ Π_t N(T_t | ŷ_t(x), s_t(x)²) over the cube, s_t² = (sd_t/√n_t)² + (standard error of ŷ_t at x)²
 
-with equal odds for every setting of the region beforehand. The models stand for the pours (a surrogate), so their lack of
-fit is not in it, and the errors of two models of the same pours count as independent. With up to four factors the
-integrals are sums over a grid: exact to its step, without a sampler and its convergence. A posterior narrower than two
-steps in some direction is refined once, on the box that holds all but a millionth of it.
+with equal odds for every setting of the region beforehand. The models stand for the pours (a surrogate), so their lack
+of fit is not in it, and the errors of two models of the same pours count as independent. With up to four factors the
+integrals are sums over a grid: exact to its step, without a sampler and its convergence. The grid is made twice, the
+second time on the box that holds all but a millionth of each factor's posterior, and s_t² takes in how much ŷ_t varies
+within a cell, Σ_j (∂ŷ_t/∂x_j · step_j)²/12, so that a target without an error is met by a sheet of cells and not by the
+luck of one.
 
 Kennedy & O'Hagan 2001, doi 10.1111/1467-9868.00294 (calibration on a surrogate, here without a discrepancy); Gelman et
 al. 2013, Bayesian Data Analysis, ch. 3 and 6 (grids, posterior predictive).
@@ -19,7 +21,7 @@ from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import optimize, stats
 
 from doe.analysis.surface import Surface
 from doe.record import Record
@@ -34,7 +36,7 @@ KEPT = 31
 OPEN_SHARE = 0.5
 """Share of the region from which on a 95 % interval leaves a factor open, as in `find_optimum`."""
 LEAST_ERROR = 1e-6
-"""Least standard error of a target, over its own size or the range of its model."""
+"""Least standard error of a target, over its own size or that of its model."""
 NEGLIGIBLE = 1e-6
 """Share of the posterior that refining may lose at each end of a factor."""
 
@@ -43,12 +45,13 @@ NEGLIGIBLE = 1e-6
 class JointPosterior(Record):
     """What the targets say together. Factors in the order of the models, in natural units; k factors, m targets.
 
-    ``density``: probability in each of ``KEPT`` equal cells between ``axis_low`` and ``axis_high``, shape (k, cells), and
-    ``pair_density`` of each pair in the order of ``itertools.combinations``, shape (pairs, cells, cells), the first
-    factor along the first axis. ``low`` and ``high``: 95 % interval, equal tails. ``predicted`` and ``predicted_sd``: the
-    mean of each target's model over the posterior and its standard deviation, the model's own error included. ``misfit``:
-    the least Σ (ŷ_t − T_t)²/s_t². ``p``: the chance that χ² with a degree of freedom per target is larger, which is that
-    of the misfit at a setting that gives all targets; the least is no larger, so a small ``p`` is safe to act on.
+    ``density``: probability in each of ``KEPT`` equal cells between ``axis_low`` and ``axis_high``, shape (k, cells),
+    and ``pair_density`` of each pair in the order of ``itertools.combinations``, shape (pairs, cells, cells), the first
+    factor along the first axis. ``low`` and ``high``: 95 % interval, equal tails. ``predicted`` and ``predicted_sd``:
+    the mean of each target's model over the posterior and its standard deviation, the model's own error included.
+    ``misfit``: the least Σ (ŷ_t − T_t)²/s_t². ``p``: the chance that χ² with a degree of freedom per target is larger,
+    which is that of the misfit at a setting that gives all targets; the least is no larger, so a small ``p`` is safe to
+    act on.
     """
 
     names: tuple[str, ...]
@@ -86,7 +89,7 @@ def joint_posterior(models: Sequence[Surface], targets: Sequence[Target]) -> Joi
     low, high = np.full(k, -1.0), np.full(k, 1.0)
     for _ in range(2):
         axes, grid = _grid(low, high, CELLS[k])
-        missed, error = _misses(models, targets, grid)
+        missed, error = _misses(models, targets, grid, within_cells=True)
         chi2 = (missed**2).sum(axis=0)
         log = -0.5 * chi2 - np.log(error).sum(axis=0)
         weight = np.exp(log - log.max())
@@ -94,7 +97,7 @@ def joint_posterior(models: Sequence[Surface], targets: Sequence[Target]) -> Joi
         step = (high - low) / CELLS[k]
         # Marginals that fill a few cells only are looked at again, on a grid of their own.
         low, high = _box(weight, axes, step)
-    return _summary(models, targets, axes, grid, weight, float(chi2.min()))
+    return _summary(models, targets, axes, grid, weight, _least_misfit(models, targets, grid[chi2.argmin()]))
 
 
 def _grid(low: FloatArray, high: FloatArray, cells: int) -> tuple[list[FloatArray], FloatArray]:
@@ -103,14 +106,28 @@ def _grid(low: FloatArray, high: FloatArray, cells: int) -> tuple[list[FloatArra
     return axes, np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
 
 
-def _misses(models: Sequence[Surface], targets: Sequence[Target], grid: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(ŷ_t − T_t)/s_t and s_t at the points, shape (m, points) each."""
-    error = np.array([np.hypot(t.standard_error, m.standard_error(grid)) for m, t in zip(models, targets, strict=True)])
-    missed = np.array([m.predict(grid) - t.mean for m, t in zip(models, targets, strict=True)])
-    # A model without error against a target without one would leave a surface of no thickness.
-    size = np.maximum(np.ptp(missed, axis=1), [abs(target.mean) for target in targets])
-    error = np.maximum(error, np.maximum(LEAST_ERROR * size, np.finfo(np.float64).tiny)[:, None])
-    return missed / error, error
+def _misses(
+    models: Sequence[Surface], targets: Sequence[Target], points: FloatArray, within_cells: bool = False
+) -> tuple[FloatArray, FloatArray]:
+    """(ŷ_t − T_t)/s_t and s_t at the points, shape (m, points) each; ``within_cells``: the points are a whole grid."""
+    missed, errors = [], []
+    for model, target in zip(models, targets, strict=True):
+        values, variance = model.predict(points), target.standard_error**2 + model.standard_error(points) ** 2
+        if within_cells:
+            k = points.shape[1]
+            steps = np.gradient(values.reshape([CELLS[k]] * k))
+            variance += sum(step.ravel() ** 2 for step in (steps if k > 1 else [steps])) / 12.0
+        # A model without error or slope against a target without error: there is no size to tell a miss by.
+        least = max(LEAST_ERROR * max(abs(target.mean), abs(float(model.coefficients[0]))), np.finfo(np.float64).tiny)
+        errors.append(np.maximum(np.sqrt(variance), least))
+        missed.append((values - target.mean) / errors[-1])
+    return np.array(missed), np.array(errors)
+
+
+def _least_misfit(models: Sequence[Surface], targets: Sequence[Target], start: FloatArray) -> float:
+    """Least Σ (ŷ_t − T_t)²/s_t² in the cube, from the best cell on."""
+    found = optimize.least_squares(lambda x: _misses(models, targets, x[None])[0][:, 0], start, bounds=(-1.0, 1.0))
+    return 2.0 * float(found.cost)
 
 
 def _marginal(weight: FloatArray, *kept: int) -> FloatArray:
@@ -139,9 +156,7 @@ def _summary(
     region, k, flat = models[0].region, len(axes), weight.ravel()
     mean = flat @ grid
     spread = grid - mean
-    steps = np.array([axis[1] - axis[0] for axis in axes])
-    # Within a cell the probability is spread evenly.
-    covariance = (spread * flat[:, None]).T @ spread + np.diag(steps**2 / 12.0)
+    covariance = (spread * flat[:, None]).T @ spread
     sd = np.sqrt(np.diag(covariance))
     intervals = np.array([_interval(_marginal(weight, j), axis) for j, axis in enumerate(axes)])
     edges = np.array([(1.5 * a[0] - 0.5 * a[1], 1.5 * a[-1] - 0.5 * a[-2]) for a in axes])

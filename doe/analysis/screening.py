@@ -13,7 +13,7 @@ view. Many effects are judged at once, so p values are corrected by Holm's step-
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -274,8 +274,8 @@ def select_factors(
     """Return the `n` factors of the next stage, each with its reason.
 
     Significant factors come first by falling |t|, the largest of all targets (`further`: those beside the first, by
-    name), then `fallback` in its order; `exclude` holds factors that this set-up cannot test. Raises StatisticsError when both together give fewer than `n`, or a name is no
-    factor.
+    name), then `fallback` in its order; `exclude` holds factors that this set-up cannot test. Raises StatisticsError
+    when both together give fewer than `n`, or a name is no factor.
     """
     known = {effect.name for effect in screening.effects if not effect.is_dummy}
     for name in (*fallback, *exclude):

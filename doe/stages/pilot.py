@@ -117,9 +117,7 @@ def pilot(study: Study, profile: Profile, runner: Runner, bias: Bias) -> PilotRe
     rows = runner.run("pilot", settings)
     target = study.targets[0].observable
     tables = {
-        setting.label: {
-            e: responses([runs], e)[0] for e in study.estimators if experiment_of(e) in setting.experiments
-        }
+        setting.label: {e: responses([runs], e)[0] for e in study.estimators if experiment_of(e) in setting.experiments}
         for setting, runs in zip(settings, rows, strict=True)
     }
     noise = {e: replicate_noise(values) for e, values in tables["reference"].items()}

@@ -6,6 +6,7 @@ The designs of the stages are Plackett–Burman of 28 and of 12 runs and Box–B
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -138,6 +139,9 @@ CALIBRATED = 3
 
 TRIES = 3
 """Seeds that are tried for one replicate; a run that jammed or broke is kept with its outcome and replaced."""
+
+EXPERIMENT = re.compile(r"[\w-]{1,60}")
+"""What an experiment may be called: its name stands before those of its observables."""
 
 Values = dict[str, float | str]
 
@@ -366,7 +370,9 @@ def study_from(table: Settings, path: Path) -> Study:
         )
     for name in experiments:
         if name not in {experiment_of(target.observable) for target in file.target}:
-            raise StudyFileError(f"experiment.name: no target reads {name}; name one, such as {name}/…, or leave it out")
+            raise StudyFileError(
+                f"experiment.name: no target reads {name}; name one, such as {name}/…, or leave it out"
+            )
     unasked = tuple(name for name in given if OBSERVABLES[name].estimator)
     estimators = unasked if file.estimators is None else file.estimators
     for name in estimators:
@@ -395,16 +401,16 @@ def study_from(table: Settings, path: Path) -> Study:
     )
 
 
-def _experiments(
-    material: Scene, table: Settings, path: Path, factors: Sequence[Factor]
-) -> dict[str, Scene]:
+def _experiments(material: Scene, table: Settings, path: Path, factors: Sequence[Factor]) -> dict[str, Scene]:
     """The scene of each experiment: the study's material, contact and effects in a rig and with a mass of its own."""
     found: dict[str, Scene] = {}
     shared = {key: table[key] for key in ("contact", "effect") if key in table}
     for entry in table.get("experiment", ()):
         name, own = entry["name"], {key: value for key, value in entry.items() if key != "name"}
-        if not NAME.fullmatch(name) or name in found:
-            raise StudyFileError(f"experiment.name: {name!r} stands twice or is no name; allowed: 1 to 60 characters, no /")
+        if not EXPERIMENT.fullmatch(name):
+            raise StudyFileError(f"experiment.name: {name!r} is no name; allowed: 1 to 60 letters, digits, - and _")
+        if name in found:
+            raise StudyFileError(f"experiment.name: {name!r} stands twice")
         try:
             other = with_set_up(material, shared | own, path.parent)
         except ParameterError as error:

@@ -198,7 +198,7 @@ class RunCounts(Record):
             valid=sum(run.valid for _, run in runs),
             by_outcome=dict(Counter(run.outcome for _, run in runs)),
             by_stage=dict(Counter(stage for stage, _ in runs)),
-            list=tuple(ListedRun(stage, run.label, run.seed, run.outcome, run.key) for stage, run in runs),
+            list=tuple(ListedRun(stage, run.title, run.seed, run.outcome, run.key) for stage, run in runs),
         )
 
     def outcomes(self) -> Mapping[str, Counter[str]]:
@@ -240,6 +240,8 @@ class StudyResult(AllStages, Described):
     about: About = field(default_factory=About)
     set_up: SetUp | None = None
     """None in results of before there was one."""
+    experiments: dict[str, SetUp] = field(default_factory=dict)
+    """Name → set-up of each further experiment."""
     piles: tuple[PouredPile, ...] = ()
     """At the reference setting and at the optimum; none of a rig without a free pile."""
 

@@ -283,4 +283,5 @@ def result_of(
         shapes=tuple(PouredBody(body.name, body.mass, body.spheres, body.clump.fit) for body in study.scene.bodies),
         about=about,
         set_up=set_up_of(study.scene),
+        experiments={name: set_up_of(scene) for name, scene in study.experiments.items()},
     )

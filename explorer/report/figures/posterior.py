@@ -115,16 +115,26 @@ def corner(posterior: JointPosterior, factors: Sequence[Factor]) -> Spec:
             if row == column:
                 traces.append(_marginal(posterior, row, middles[row], factors[row]) | place)
                 ends = [float(end[row]) / sizes[row] for end in (posterior.low, posterior.high)]
-                band = {"type": "rect", "xref": x, "yref": f"{y} domain", "x0": ends[0], "x1": ends[1], "y0": 0, "y1": 1}
-                layout["shapes"].append(
-                    band | {"fillcolor": INTERVAL_BAND, "line": {"width": 0}, "layer": "below"}
-                )
+                band = {
+                    "type": "rect",
+                    "xref": x,
+                    "yref": f"{y} domain",
+                    "x0": ends[0],
+                    "x1": ends[1],
+                    "y0": 0,
+                    "y1": 1,
+                }
+                layout["shapes"].append(band | {"fillcolor": INTERVAL_BAND, "line": {"width": 0}, "layer": "below"})
             else:
                 # The first factor of a pair runs along the first axis of its density, which is here the x axis.
                 density = pairs[column, row].T
                 traces.append(
                     {"type": "heatmap", "x": middles[column].tolist(), "y": middles[row].tolist()}
-                    | {"z": (density / density.max()).round(4).tolist(), "colorscale": FAINT_TO_FULL, "showscale": False}
+                    | {
+                        "z": (density / density.max()).round(4).tolist(),
+                        "colorscale": FAINT_TO_FULL,
+                        "showscale": False,
+                    }
                     | {"hovertemplate": "%{x:.4g}, %{y:.4g}: %{z:.2f} of the peak<extra></extra>"}
                     | place
                 )

@@ -86,7 +86,7 @@ def contours(fitted: FittedTarget) -> Spec:
 
 
 def section(fitted: FittedTarget, i: int, j: int, side: int) -> Array:
-    """The model [SI] on a grid over factors i (columns) and j (rows), ``side`` points each, the others at the section."""
+    """The model [SI] on a grid over factors i (columns), j (rows), ``side`` points each, the others at the section."""
     fixed = fitted.model.region.coded(fitted.section_point)
     coded = np.broadcast_to(fixed, (side, side, fixed.size)).copy()
     coded[..., i], coded[..., j] = np.meshgrid(np.linspace(-1, 1, side), np.linspace(-1, 1, side))

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import math
 
-from doe.analysis.optimum import Compromise
 from doe.analysis.screening import SIGNIFICANT
 from doe.analysis.t_tests import Sample
 from doe.analysis.verification import Verification
 from doe.stages.screening import ScreeningResult
-from doe.stages.surface import OptimumResult
 from doe.stages.verification import VerificationResult
 from doe.studies.factors import MIN_BODIES
 from doe.studies.study_result import StudyResult, valid_runs
 from doe.target import Target
 from explorer.report.content import Banner, Block, Caution, Facts, Figure, Section, Strong, Struck, Table, Text, Word
 from explorer.report.figures.effects import all_effects
-from explorer.report.figures.model import cloud, fitted_targets, ranges
 from explorer.report.figures.pours import pile_outlines
 from explorer.report.figures.pours import verification as verification_chart
-from explorer.report.identified import BY_RULE, GIVES_TARGET, cloud_caution, is_identified, rule, settings
+from explorer.report.identified import BY_RULE, settings
 from explorer.units import (
     MISSING,
     code,
@@ -31,10 +28,7 @@ from explorer.units import (
     observed,
     p_value,
     parameter_label,
-    parameter_range,
-    parameter_value,
     percent,
-    signed,
     unit_of_observable,
 )
 
@@ -60,7 +54,8 @@ def banner(result: StudyResult) -> Banner:
         return Banner(
             Word.OUT_OF_REACH,
             "",
-            f"No setting of the region gives {observed(first, single.target)}: the model reaches {reach}, and {poured}.",
+            f"No setting of the region gives {observed(first, single.target)}: the model reaches {reach}, and "
+            f"{poured}.",
             "Widen the ranges of the factors that act, or add a factor that is missing: for round bodies rolling "
             "resistance, `effect.rolling_resistance.rolling_friction`.",
         )

@@ -179,6 +179,7 @@ def screening(result: StudyResult) -> Section:
         "margins, 95 %."
     )
     blocks += [Figure("half-normal", half_normal(part), caption), effect_table(part)]
+    blocks += [further_effects(part)] if part.further_analyses else []
     notes = (*analysis.notes, _no_pile_note(part))
     blocks.append(Bullets(notes))
     blocks += not_testable(part)
@@ -233,6 +234,19 @@ def effect_table(part: ScreeningResult) -> Table:
         "pours in the target's own observable."
     )
     return Table(header, tuple(rows), caption)
+
+
+def further_effects(part: ScreeningResult) -> Table:
+    """Effects on the targets beside the first, with their corrected p."""
+    rows = []
+    for name, analysis in part.further_analyses.items():
+        for effect in analysis.factor_effects():
+            test = analysis.deciding_test(effect)
+            half = f"± {fixed(analysis.half_width(effect))}"
+            p = MISSING if test is None else p_value(test.p_holm)
+            rows.append((observable_title(name), effect.name.replace("_", " "), signed(effect.effect), half, p))
+    caption = "Effects on the other targets; of a factor the largest |t| over all targets counts for going on."
+    return Table(("target", "factor", "effect", "95 %", "p Holm"), tuple(rows), caption)
 
 
 def row_table(part: ScreeningResult) -> Table:

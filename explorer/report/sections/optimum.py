@@ -178,17 +178,20 @@ def _posterior(result: StudyResult, posterior: JointPosterior) -> list[Block]:
         for target, mean, sd in zip(targets, posterior.predicted, posterior.predicted_sd, strict=True)
     )
     text = (
-        "Every setting of the region beforehand equally likely, normal errors of target and model: what the measurement "
-        f"leaves of the factors. Predicted from it (mean ± standard deviation of the mean response): {predicted}."
+        "Every setting of the region beforehand equally likely, normal errors of target and model: what the "
+        "measurements leave of the factors. Predicted from it (mean ± standard deviation of the mean response): "
+        f"{predicted}."
     )
     if posterior.p < CONTRADICTION:
         text += (
-            f" No setting gives all targets: the least misfit is {fixed(posterior.misfit)} (χ², p = "
-            f"{p_value(posterior.p)}), so that the intervals are no answer; the model, or a measurement, is wrong."
+            f" No setting of the region gives {'all targets' if len(targets) > 1 else 'the target'}: the least misfit "
+            f"is {fixed(posterior.misfit)} (χ², p = {p_value(posterior.p)}), so that the intervals are no answer; a "
+            "measurement or the model is wrong, or the true setting lies outside the region."
         )
     header = ("factor", "parameter", "mean", "95 % interval", "of the region")
     caption = (
         "Posterior of the factors on the fitted surfaces: diagonal, each factor with its 95 % interval; below, each "
-        f"pair (darker: likelier). n = {sum(model.observed.size for model in result.surface.models)} runs of the design."
+        f"pair (darker: likelier). n = {sum(model.observed.size for model in result.surface.models)} readings of the "
+        "design's runs."
     )
     return [Text(text), Table(header, rows), Figure("posterior", corner(posterior, factors), caption)]

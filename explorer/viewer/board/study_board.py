@@ -121,7 +121,10 @@ def _runs(result: AnyStudy) -> BoardTable:
         for stage, run in runs
     )
     opens = tuple({"do": "open_run", "stage": stage, "label": run.label, "seed": run.seed} for stage, run in runs)
-    caption = f"Value: {enumeration([observable_label(name) for name in first.values()][::-1])}. A click on a row pours that run in the scene."
+    read = enumeration(
+        [observable_label(name) for name in dict.fromkeys(first[experiment_of(name)] for name in targets)]
+    )
+    caption = f"Value: {read}. A click on a row pours that run in the scene."
     return BoardTable(f"Runs ({len(rows)})", Table(RUN_HEADER, rows, caption), opens)
 
 
