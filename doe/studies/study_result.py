@@ -12,6 +12,7 @@ from doe.record import Document, Record
 from doe.run_records import Run, Setting
 from doe.stages.ascent import AscentResult
 from doe.stages.pilot import PilotResult
+from doe.stages.reach import ReachResult
 from doe.stages.scan import ScanResult
 from doe.stages.screening import ScreeningResult
 from doe.stages.stage import FurtherResult
@@ -24,6 +25,7 @@ from solver import ClumpFit, Outcome
 
 StageResult = (
     PilotResult
+    | ReachResult
     | ScreeningResult
     | ScanResult
     | AscentResult
@@ -87,6 +89,7 @@ class Stages(Record):
     """The result of every stage, in running order; None of one that has not ended, or that the study does not have."""
 
     pilot: PilotResult | None = None
+    reach: ReachResult | None = None
     screening: ScreeningResult | None = None
     assumptions: ScreeningResult | None = None
     scan: ScanResult | None = None

@@ -79,6 +79,8 @@ class StudyOrder:
     notes: str = ""
     target: Path | None = None
     """Folder of photographs that take the place of the study's own angle of repose (`explorer.photograph.target`)."""
+    beyond_reach: bool = False
+    """Leave out the stage that stops a study whose target no setting comes near."""
     piles: Path | None = None
     """New file for the answer as a recording; ``record``: folder for all pours of the verification."""
 
@@ -90,6 +92,8 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
     result that stands in the folder already, if there is one, is only recorded.
     """
     study, profile = with_profile(load_study(order.study), order.profile)
+    if order.beyond_reach:
+        profile = replace(profile, reach_runs=0)
     if order.piles is not None:
         check_new_file(order.piles, suffix=".rrd")
         if (finished := None if order.resume else _finished(order.out, study.file, profile.name)) is not None:

@@ -9,7 +9,7 @@ from explorer.report.content import Section
 from explorer.report.methods import study_methods
 from explorer.report.sections.answer import effects, overview, parameters, piles, verification
 from explorer.report.sections.closing import further, paper, repeat, runs
-from explorer.report.sections.designs import assumptions, noise, scan, screening
+from explorer.report.sections.designs import assumptions, noise, reach, scan, screening
 from explorer.report.sections.optimum import optimum
 from explorer.report.sections.surface import ascent, surface
 from explorer.report.set_up import set_up
@@ -33,6 +33,7 @@ STAGES_FOUND: tuple[Callable[[StudyResult], Section | None], ...] = (
     verification,
     effects,
     noise,
+    reach,
     screening,
     assumptions,
     scan,

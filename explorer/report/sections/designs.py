@@ -83,6 +83,24 @@ def noise(result: StudyResult) -> Section:
     return Section("Noise of one pour", tuple(blocks))
 
 
+def reach(result: StudyResult) -> Section | None:
+    """The two corners of the factors of known direction; None where they were not poured."""
+    found = result.reach
+    if found is None:
+        return None
+    rows = tuple(
+        (setting.label, str(one.n), observed(found.observable, one.mean), observed(found.observable, error))
+        for setting, one, error in zip(found.settings, found.corners, found.standard_errors, strict=True)
+    )
+    caption = (
+        f"Friction and rolling friction up, restitution down, of {enumeration(found.factors)}; the others at their "
+        "reference. Out of reach is a target ± 2 standard errors that lies beyond the nearer mean by more than the "
+        "whole range between the two, and by more than 3 standard errors."
+    )
+    table = Table(("corner", "valid pours", observable_label(found.observable), "standard error"), rows, caption)
+    return Section("Reach", (Text(f"{found.line[0].upper()}{found.line[1:]}."), table))
+
+
 def _estimators(pilot: PilotResult) -> Table:
     choice, bias = pilot.choice, pilot.estimator_bias
     changes = [] if choice is None else list(dict.fromkeys(s.change for s in choice.separations))

@@ -153,11 +153,17 @@ def _compromise(result: StudyResult, compromise: Compromise) -> list[Block]:
         Figure(
             "overlaid",
             overlaid(fitted),
-            "Contours of all targets over each other, the other factors at the optimum: full, the model gives the "
-            "target; dotted, target ± margin; filled, where every target is within its margin.",
+            f"Contours of all targets over each other (n = {_readings(result)} readings of the design's runs), the "
+            "other factors at the optimum: full, the model gives the target; dotted, target ± margin; filled, where "
+            "every target is within its margin.",
         )
     )
     return blocks
+
+
+def _readings(result: StudyResult) -> int:
+    """Of all targets, that the surfaces are fitted to."""
+    return sum(model.observed.size for model in result.surface.models)
 
 
 def _posterior(result: StudyResult, posterior: JointPosterior) -> list[Block]:
@@ -191,7 +197,6 @@ def _posterior(result: StudyResult, posterior: JointPosterior) -> list[Block]:
     header = ("factor", "parameter", "mean", "95 % interval", "of the region")
     caption = (
         "Posterior of the factors on the fitted surfaces: diagonal, each factor with its 95 % interval; below, each "
-        f"pair (darker: likelier). n = {sum(model.observed.size for model in result.surface.models)} readings of the "
-        "design's runs."
+        f"pair (darker: likelier). n = {_readings(result)} readings of the design's runs."
     )
     return [Text(text), Table(header, rows), Figure("posterior", corner(posterior, factors), caption)]
