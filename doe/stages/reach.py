@@ -24,7 +24,7 @@ from doe.stages.stage import Chain, Stage, ended
 from doe.studies.profile import Profile
 from doe.studies.study import Factor, Study
 from doe.target import Target, observed_text
-from solver import Scene, parameters, value
+from solver import parameters, value
 
 DIRECTIONS = {"static_friction": 1, "rolling_friction": 1, "restitution": -1}
 """Last part of a parameter's path → the sign of its effect on an angle of repose."""
@@ -94,6 +94,7 @@ def reach(study: Study, profile: Profile, runner: Runner, noise: Noise) -> Reach
     low, high = (sample_of(runs, target.observable) for runs in rows)
     errors = [max(noise.sigma, 0.0 if math.isnan(one.sd) else one.sd) / math.sqrt(max(one.n, 1)) for one in (low, high)]
     ends, slack = (low.mean, high.mean), 2.0 * target.standard_error
+    beyond = max(target.mean - slack - max(ends), min(ends) - target.mean - slack)
     found = ReachResult(
         factors=tuple(factor.name for factor in known),
         observable=target.observable,
@@ -101,12 +102,12 @@ def reach(study: Study, profile: Profile, runner: Runner, noise: Noise) -> Reach
         standard_errors=(errors[0], errors[1]),
         target=target.mean,
         target_standard_error=target.standard_error,
-        beyond=max(target.mean - slack - max(ends), min(ends) - target.mean - slack),
+        beyond=math.nan if low.n == 0 or high.n == 0 else beyond,
         settings=tuple(settings),
         runs=tuple(tuple(runs) for runs in rows),
     )
     if not found.within:
-        raise StatisticsError(_hopeless(found, target, study.scene))
+        raise StatisticsError(_hopeless(found, target, study))
     return found
 
 
@@ -125,13 +126,14 @@ def _kind(factor: Factor) -> str:
     return factor.path.rpartition(".")[2]
 
 
-def _hopeless(found: ReachResult, target: Target, scene: Scene) -> str:
+def _hopeless(found: ReachResult, target: Target, study: Study) -> str:
     goal, spread = observed_text(target.observable, target.mean), 2.0 * target.standard_error
     margin = f" ± {observed_text(target.observable, spread)}" if spread else ""
     cause = "a parameter that no factor varies"
     if target.mean > max(one.mean for one in found.corners):
         cause = "a missing effect"
-        if ROLLING in parameters(scene) and value(scene, ROLLING) == 0.0:
+        varied = ROLLING in (factor.path for factor in study.factors)
+        if not varied and ROLLING in parameters(study.scene) and value(study.scene, ROLLING) == 0.0:
             cause += " (rolling resistance is none now: add [effect.rolling_resistance] rolling_friction = 0.1)"
     return (
         f"out of reach: {found.between} over the ranges of {', '.join(found.factors)} against {goal}{margin}; likely "
