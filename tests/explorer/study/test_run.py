@@ -125,7 +125,7 @@ def test_a_target_out_of_reach_stops_a_study_unless_it_is_told_to_go_on(tmp_path
     class Flat(Formula):
         def _once(self, stage, row, setting, replicate, attempt):
             run = super()._once(stage, row, setting, replicate, attempt)
-            seen = {name: 3.0 + 0.1 * (run.seed % 5) for name in run.observables}
+            seen = dict.fromkeys(run.observables, 3.0 + 0.1 * (run.seed % 5))
             return dataclasses.replace(run, observables=seen)
 
     monkeypatch.setattr(study_run, "PourRunner", Flat)
