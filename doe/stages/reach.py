@@ -21,10 +21,10 @@ from doe.errors import StatisticsError
 from doe.record import Record
 from doe.run_records import Run, Runner, Setting, sample_of
 from doe.stages.stage import Chain, Stage, ended
+from doe.studies.factors import is_off
 from doe.studies.profile import Profile
 from doe.studies.study import Factor, Study
 from doe.target import Target, observed_text
-from solver import parameters, value
 
 DIRECTIONS = {"static_friction": 1, "rolling_friction": 1, "restitution": -1}
 """Last part of a parameter's path → the sign of its effect on an angle of repose."""
@@ -133,7 +133,7 @@ def _hopeless(found: ReachResult, target: Target, study: Study) -> str:
     if target.mean > max(one.mean for one in found.corners):
         cause = "a missing effect"
         varied = ROLLING in (factor.path for factor in study.factors)
-        if not varied and ROLLING in parameters(study.scene) and value(study.scene, ROLLING) == 0.0:
+        if not varied and is_off(study.scene, ROLLING):
             cause += " (rolling resistance is none now: add [effect.rolling_resistance] rolling_friction = 0.1)"
     return (
         f"out of reach: {found.between} over the ranges of {', '.join(found.factors)} against {goal}{margin}; likely "

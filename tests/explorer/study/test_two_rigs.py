@@ -20,6 +20,7 @@ from explorer.report.study_charts import study_plots
 from explorer.study.duration import duration_text, reckoned_time, runs_of_scenes
 from explorer.study.run import result_of
 from explorer.study.runs import scene_of
+from explorer.units import observed
 from explorer.viewer.board.board import board_json
 from explorer.viewer.board.study_board import listed_runs, study_board
 from explorer.viewer.study.profiler_panel import prediction_markdown
@@ -81,8 +82,8 @@ def test_the_board_names_the_experiment_of_a_run_and_shows_what_all_targets_leav
     assert board_json(board)
     table = board.tables[-1].table
     rows = {(row[1], row[2]): row for row in table.rows}
-    run = next(run for run in result.surface.runs[2] if run.experiment)
-    assert rows["point 3, drum", str(run.seed)][4] == f"{run.observables['drum/dynamic_angle_deg']:.1f}°"
+    name, run = "drum/dynamic_angle_deg", next(run for run in result.surface.runs[2] if run.experiment)
+    assert rows["point 3, drum", str(run.seed)][4] == observed(name, run.observables[name])
     assert len(table.rows) == len(listed_runs(result))
     assert "dynamic angle" in table.caption
     plots = study_plots(result)
