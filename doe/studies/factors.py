@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from solver import ParameterError, Scene, body_counts, canonical, parameters, with_values
+from solver import ParameterError, Scene, body_counts, canonical, parameters, value, with_values
 
 MIN_BODIES = 5
 """A factor that touches fewer bodies than this cannot be tested: its effect is that of a handful of places."""
