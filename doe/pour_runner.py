@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -31,9 +31,9 @@ OnRun = Callable[[str, Run, int], None]
 """Called with (stage, run, replicates of this stage that are still to come)."""
 
 
-def seed_of(study_seed: int, stage: str, row: int, replicate: int, attempt: int) -> int:
+def seed_of(study_seed: int, stage: str, row: int, replicate: int, attempt: int, experiment: str = "") -> int:
     """A seed of its own for every run: independent streams from one root (NumPy's SeedSequence)."""
-    entropy = [study_seed, *stage.encode(), row, replicate, attempt]
+    entropy = [study_seed, *stage.encode(), row, replicate, attempt, *experiment.encode()]
     return int(np.random.SeedSequence(entropy).generate_state(1)[0])
 
 
@@ -75,7 +75,8 @@ class PourRunner:
     """Runs settings as pours and keeps every run in the store.
 
     ``tries`` seeds are tried for one replicate. ``seeds`` are those of the replicates, of which then none is replaced;
-    None: a stream of its own for every run (:func:`seed_of`). Pours run in this process, where ``observer`` can watch
+    None: a stream of its own for every run (:func:`seed_of`). ``experiments``: the scenes of the study's further
+    experiments by name. Pours run in this process, where ``observer`` can watch
     them, or as ``pours`` says (``solver.WorkerPool.run_queue``).
     """
 
@@ -91,19 +92,25 @@ class PourRunner:
         pours: Pours | None = None,
         tries: int = TRIES,
         seeds: Sequence[int] | None = None,
+        experiments: Mapping[str, Scene] | None = None,
     ) -> None:
-        self._scene, self._store, self._study, self._seed = scene, store, study, study_seed
+        self._scenes = {"": scene, **(experiments or {})}
+        self._store, self._study, self._seed = store, study, study_seed
         self._threads, self._on_run, self._observer = threads, on_run, observer
         self._pours, self._seeds = pours, seeds
         self._tries = tries if seeds is None else 1
 
     def run(self, stage: str, settings: Sequence[Setting]) -> list[list[Run]]:
         """See :class:`Runner`. Runs found in the store are taken from there."""
-        scenes = [with_values(self._scene, setting.values) for setting in settings]
+        scenes = {
+            (row, name): with_values(self._scenes[name], setting.values)
+            for row, setting in enumerate(settings)
+            for name in setting.experiments
+        }
         found: list[list[Run]] = [[] for _ in settings]
-        places: list[tuple[int, int, int, str]] = []
+        places: list[tuple[int, str, int, int, str]] = []
         queue: deque[Job] = deque()
-        waiting = [sum(setting.replicates for setting in settings)]
+        waiting = [sum(setting.replicates * len(setting.experiments) for setting in settings)]
 
         def settle(run: Run, row: int) -> None:
             found[row].append(run)
@@ -112,26 +119,30 @@ class PourRunner:
             if self._on_run is not None:
                 self._on_run(stage, run, waiting[0])
             if again:
-                request(row, run.replicate, run.attempt + 1)
+                request(row, run.experiment, run.replicate, run.attempt + 1)
 
-        def request(row: int, replicate: int, attempt: int) -> None:
+        def request(row: int, experiment: str, replicate: int, attempt: int) -> None:
+            scene = scenes[row, experiment]
             seed = (
-                seed_of(self._seed, stage, row, replicate, attempt) if self._seeds is None else self._seeds[replicate]
+                seed_of(self._seed, stage, row, replicate, attempt, experiment)
+                if self._seeds is None
+                else self._seeds[replicate]
             )
-            key = pour_key(scenes[row], seed)
+            key = pour_key(scene, seed)
             stored = self._store.find(key)
             if stored is not None:
-                stored = self._store.read(stored, observable_names(scenes[row]), observables_of)
-                settle(_reused(stored, settings[row], replicate, attempt), row)
+                stored = self._store.read(stored, observable_names(scene), observables_of)
+                settle(_run(stored, settings[row], experiment, replicate, attempt, reused=True), row)
             else:
-                places.append((row, replicate, attempt, key))
-                queue.append(Job(scenes[row], seed, tag=len(places) - 1))
+                places.append((row, experiment, replicate, attempt, key))
+                queue.append(Job(scene, seed, tag=len(places) - 1))
 
         # The whole design once, then again: what is there so far can be analysed long before the last run.
         for replicate in range(max((setting.replicates for setting in settings), default=0)):
             for row, setting in enumerate(settings):
                 if replicate < setting.replicates:
-                    request(row, replicate, 0)
+                    for experiment in setting.experiments:
+                        request(row, experiment, replicate, 0)
 
         def sample(job: Job, pour: Any) -> None:
             if self._observer is not None:
@@ -141,32 +152,26 @@ class PourRunner:
             return run_queue(jobs, room, self._threads, on_sample=sample)
 
         if queue:
-            for job, record in (self._pours or here)(queue, scenes):
-                row, replicate, attempt, key = places[job.tag]
+            for job, record in (self._pours or here)(queue, list(scenes.values())):
+                row, experiment, replicate, attempt, key = places[job.tag]
                 if self._observer is not None:
                     self._observer.finish(stage, job.seed, record)
-                settle(self._keep(stage, settings[row], replicate, attempt, job, record, key), row)
-        return [sorted(runs, key=lambda run: (run.replicate, run.attempt)) for runs in found]
+                label = settings[row].label + (f", {experiment}" if experiment else "")
+                stored = stored_run(job, record, self._study, stage, label, observables_of, key)
+                self._store.add(stored)
+                settle(_run(stored, settings[row], experiment, replicate, attempt), row)
+        return [sorted(runs, key=self._order) for runs in found]
 
-    def _keep(
-        self, stage: str, setting: Setting, replicate: int, attempt: int, job: Job, record: PourRecord, key: str
-    ) -> Run:
-        stored = stored_run(job, record, self._study, stage, setting.label, observables_of, key)
-        self._store.add(stored)
-        return Run(
-            setting.label,
-            replicate,
-            attempt,
-            job.seed,
-            stored.outcome,
-            stored.message,
-            stored.observables,
-            stored.wall_s,
-            stored.key,
-        )
+    def _order(self, run: Run) -> tuple[int, int, int]:
+        return list(self._scenes).index(run.experiment), run.replicate, run.attempt
 
 
-def _reused(stored: StoredRun, setting: Setting, replicate: int, attempt: int) -> Run:
+def _run(
+    stored: StoredRun, setting: Setting, experiment: str, replicate: int, attempt: int, reused: bool = False
+) -> Run:
+    observables = stored.observables
+    if experiment:
+        observables = {f"{experiment}/{name}": value for name, value in observables.items()}
     return Run(
         label=setting.label,
         replicate=replicate,
@@ -174,8 +179,9 @@ def _reused(stored: StoredRun, setting: Setting, replicate: int, attempt: int) -
         seed=stored.seed,
         outcome=stored.outcome,
         message=stored.message,
-        observables=stored.observables,
+        observables=observables,
         wall_s=stored.wall_s,
         key=stored.key,
-        reused=True,
+        reused=reused,
+        experiment=experiment,
     )

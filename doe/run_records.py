@@ -27,6 +27,8 @@ class Setting(Record):
     label: str
     values: dict[str, float | str]
     replicates: int
+    experiments: tuple[str, ...] = ("",)
+    """Names of those of the study's experiments that are run; "" is its own rig."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,13 @@ class Run(Record):
     key: str
     reused: bool = False
     """True if it was found in the store."""
+    experiment: str = ""
+    """The one that was run; its name and "/" stand before those of its observables."""
+
+    @property
+    def title(self) -> str:
+        """The setting, and the experiment where that is not the study's own."""
+        return f"{self.label}, {self.experiment}" if self.experiment else self.label
 
     @property
     def valid(self) -> bool:

@@ -44,6 +44,11 @@ def observed_text(observable: str, value: float) -> str:
     return f"{value:.1f}°" if is_angle(observable) else f"{value:.3g}"
 
 
+def experiment_of(observable: str) -> str:
+    """The experiment of a study in which ``observable`` is read, "drum" of "drum/dynamic_angle_deg"; "" for its own."""
+    return observable.rpartition("/")[0]
+
+
 def is_angle(observable: str) -> bool:
     """True for an observable in degrees, a single view (``…_deg@90``) included."""
     return observable.partition("@")[0].endswith("_deg")

@@ -123,6 +123,7 @@ def unit_of_observable(name: str) -> ReadingUnit:
     """Unit in which the observable ``name`` is read."""
     if name.startswith(OWN):
         return ReadingUnit(_own(name)[1], 1.0)
+    name = name.rpartition("/")[2]
     return reading_unit(OBSERVABLES[name].unit if name in OBSERVABLES else "1")
 
 
@@ -170,11 +171,13 @@ def axis_title(path: str, name: str) -> str:
 
 
 def observable_label(name: str) -> str:
-    """Words for an observable."""
+    """Words for an observable, with the experiment of a study in which it is read."""
     if name.startswith(OWN):
         return _own(name)[0]
-    known = OBSERVABLES.get(name)
-    return (known.label if known else "") or name.replace("_", " ")
+    experiment, _, reading = name.rpartition("/")
+    known = OBSERVABLES.get(reading)
+    label = (known.label if known else "") or reading.replace("_", " ")
+    return f"{label}, {experiment.replace('_', ' ')}" if experiment else label
 
 
 def observable_title(name: str) -> str:

@@ -15,14 +15,15 @@ Of several targets the setting is taken whose predicted responses miss them leas
 
 with s_t² = sd_t²/n_t + (standard error of the model at the centre)², so that a target counts by how well it is
 known on both sides; ties (a valley of equal J) are broken by the distance to the measured parameters. Weighted least
-squares on response surfaces; compare Derringer & Suich 1980, which needs desirability limits that nobody measured.
+squares on response surfaces. The desirability of Derringer & Suich 1980 is told beside it, with the margins of
+equivalence as its limits; it is not maximised, because what is outside a margin has no slope in it.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 from typing import Literal
 
@@ -106,6 +107,9 @@ class Compromise(Record):
     standardised: FloatArray
     misfit: float
     statement: str
+    desirability: FloatArray = field(default_factory=lambda: np.zeros(0))
+    """Of each target at the chosen point: 1 at the target, falling straight to 0 at target ± margin (Derringer & Suich
+    1980, doi 10.1080/00224065.1980.11980968, exponent 1); the whole is the geometric mean by weight."""
 
 
 def find_optimum(
@@ -221,14 +225,16 @@ def find_compromise(models: Sequence[Surface], targets: Sequence[Target], refere
     statement = f"The targets are missed by at most {abs(missed[worst]):.1f} standard errors (target {worst + 1})."
     if abs(missed[worst]) > 2.0:
         statement += " They contradict each other within this model and region."
-    statement += " The interval and the width given beside it describe the first target alone."
+    predicted = missed * spread + goal
+    margin = np.array([t.margin for t in targets])
     return Compromise(
         point=region.natural(best.x),
         point_coded=np.asarray(best.x),
-        predicted=missed * spread + goal,
+        predicted=predicted,
         standardised=missed,
         misfit=misfit,
         statement=statement,
+        desirability=np.maximum(0.0, 1.0 - np.abs(predicted - goal) / margin),
     )
 
 

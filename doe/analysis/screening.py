@@ -13,7 +13,7 @@ view. Many effects are judged at once, so p values are corrected by Holm's step-
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -179,7 +179,8 @@ class Screening(Record):
 
 @dataclass(frozen=True)
 class Selected(Record):
-    """A factor taken to the next stage and why: "significant" or "fallback: not significant"."""
+    """A factor taken to the next stage and why: "significant", "significant in" another target, or "fallback: not
+    significant"."""
 
     name: str
     reason: str
@@ -268,18 +269,27 @@ def select_factors(
     exclude: Sequence[str] = (),
     alpha: float = 0.05,
     adjust: Adjustment = "holm",
+    further: Mapping[str, Screening] | None = None,
 ) -> tuple[Selected, ...]:
     """Return the `n` factors of the next stage, each with its reason.
 
-    Significant factors come first by falling |t|, then `fallback` in its order; `exclude` holds factors that
-    this set-up cannot test. Raises StatisticsError when both together give fewer than `n`, or a name is no
-    factor.
+    Significant factors come first by falling |t|, the largest of all targets (`further`: those beside the first, by
+    name), then `fallback` in its order; `exclude` holds factors that this set-up cannot test. Raises StatisticsError
+    when both together give fewer than `n`, or a name is no factor.
     """
     known = {effect.name for effect in screening.effects if not effect.is_dummy}
     for name in (*fallback, *exclude):
         if name not in known:
             raise StatisticsError(f"'{name}' is no factor of the screening; allowed are {', '.join(sorted(known))}")
-    chosen = [Selected(name, SIGNIFICANT) for name in screening.significant(alpha, adjust) if name not in exclude]
+    sizes: dict[str, tuple[float, str]] = {}
+    for target, one in {"": screening, **(further or {})}.items():
+        found, reason = one.significant(alpha, adjust), f"{SIGNIFICANT} in {target}" if target else SIGNIFICANT
+        for effect in one.effects:
+            test = one.deciding_test(effect) if effect.name in found and effect.name not in exclude else None
+            if test is not None:
+                size, said = sizes.get(effect.name, (0.0, reason))
+                sizes[effect.name] = max(size, abs(test.t)), said
+    chosen = [Selected(name, sizes[name][1]) for name in sorted(sizes, key=lambda name: -sizes[name][0])]
     for name in fallback:
         if name not in exclude and name not in {selected.name for selected in chosen}:
             chosen.append(Selected(name, FALLBACK))

@@ -22,6 +22,9 @@ from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
 
+LEAST_SHARE = 0.25
+"""Half-width of a region, at least, as a share of a factor's range."""
+
 
 @dataclass(frozen=True)
 class AscentFactor:
@@ -161,7 +164,7 @@ def bracket(path_means: npt.ArrayLike, target: float, standard_errors: npt.Array
     return Bracket(target, lower, upper, position, True, resolved, nearest, len(pairs), errors, relative, statement)
 
 
-def region_around(path: AscentPath, found: Bracket, minimum_share: float = 0.25) -> Region:
+def region_around(path: AscentPath, found: Bracket, minimum_share: float = LEAST_SHARE) -> Region:
     """Return the box of the Box–Behnken design: centred where the path meets the target, within the ranges.
 
     The half-width of a factor is one step of the path, but at least `minimum_share` of its range (a factor

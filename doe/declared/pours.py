@@ -39,6 +39,11 @@ class Ended:
     attempt: int = 0
 
     @property
+    def title(self) -> str:
+        """What it is called in lists."""
+        return self.label
+
+    @property
     def valid(self) -> bool:
         """Whether the run came to its end."""
         return self.outcome.valid

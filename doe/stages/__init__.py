@@ -3,6 +3,7 @@
 from doe.errors import StudyFileError
 from doe.stages.ascent import AscentStage
 from doe.stages.pilot import PilotStage
+from doe.stages.reach import ReachStage
 from doe.stages.scan import ScanStage
 from doe.stages.screening import AssumptionStage, ScreeningStage
 from doe.stages.stage import Stage
@@ -14,6 +15,7 @@ from solver import Registry, instance_of
 
 OWN: tuple[Stage, ...] = (
     PilotStage(),
+    ReachStage(),
     ScreeningStage(),
     AssumptionStage(),
     ScanStage(),

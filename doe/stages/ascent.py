@@ -10,7 +10,16 @@ import numpy as np
 from doe.analysis.pilot import Noise
 from doe.analysis.power import smallest_effect
 from doe.analysis.screening import SIGNIFICANT
-from doe.analysis.steepest_ascent import AscentFactor, AscentPath, Bracket, Region, ascent_path, bracket, region_around
+from doe.analysis.steepest_ascent import (
+    LEAST_SHARE,
+    AscentFactor,
+    AscentPath,
+    Bracket,
+    Region,
+    ascent_path,
+    bracket,
+    region_around,
+)
 from doe.record import Record
 from doe.run_records import FloatArray, Run, Runner, Setting, responses
 from doe.stages.screening import ScreeningResult
@@ -52,7 +61,8 @@ def ascent(study: Study, profile: Profile, runner: Runner, screened: ScreeningRe
 
     Direction, steps and prediction come from the effects on the target's own observable, whichever estimator selected
     the factors: the walk has to arrive at the measured value. ``noise`` of that observable is the pilot's, which
-    knows the spread of one run better than the few runs of a step.
+    knows the spread of one run better than the few runs of a step. In a study of several experiments the region is the
+    whole of the ranges: the walk knows the first target only.
     """
     target = study.targets[0]
     by_name = {factor.name: factor for factor in study.factors}
@@ -60,6 +70,8 @@ def ascent(study: Study, profile: Profile, runner: Runner, screened: ScreeningRe
     factors = tuple(by_name[chosen.name] for chosen in screened.selected)
     walk = [AscentFactor(f.name, float(f.low), float(f.high), effects[f.name]) for f in factors]
     path = ascent_path(walk, screened.target_analysis.mean, steps=profile.ascent_steps)
+    # Where the solutions of several experiments cross may be far from where the walk passes the first target's.
+    share = 0.5 if study.experiments else LEAST_SHARE
     settings = [
         Setting(
             f"step {k + 1}",
@@ -86,7 +98,7 @@ def ascent(study: Study, profile: Profile, runner: Runner, screened: ScreeningRe
         settings=tuple(settings),
         runs=tuple(tuple(runs) for runs in rows),
         bracket=found,
-        region=region_around(path, found),
+        region=region_around(path, found, share),
         smallest_difference=smallest_effect(noise.sigma * math.sqrt(2.0 / profile.ascent_replicates), noise.runs - 1),
         notes=_notes(screened),
     )
@@ -97,12 +109,12 @@ def _notes(screened: ScreeningResult) -> tuple[str, ...]:
     in_target = screened.target_analysis.significant()
     notes = []
     for chosen in screened.selected:
-        if chosen.reason != SIGNIFICANT:
+        if not chosen.reason.startswith(SIGNIFICANT):
             notes.append(f"{chosen.name} is {chosen.reason}; its direction is that of an effect within noise.")
         elif chosen.name not in in_target:
+            reason = f"{SIGNIFICANT} in {screened.response}" if chosen.reason == SIGNIFICANT else chosen.reason
             notes.append(
-                f"{chosen.name} is significant in {screened.response} but not in the target's own observable, from "
-                "which the direction is taken."
+                f"{chosen.name} is {reason} but not in the target's own observable, from which the direction is taken."
             )
     return tuple(notes)
 

@@ -40,7 +40,7 @@ from doe.run_records import FloatArray, Run, Runner, Setting, responses
 from doe.stages.stage import Bias, Chain, Stage
 from doe.studies.profile import Profile
 from doe.studies.study import CALIBRATED, Study
-from doe.target import is_angle
+from doe.target import experiment_of, is_angle
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class PilotStage(Stage):
 
     def planned_runs(self, study: Study, profile: Profile) -> int:
         """The reference setting, and the declared changes."""
-        return profile.pilot_runs + profile.change_runs * len(study.changes)
+        return profile.pilot_runs * len(study.all_experiments) + profile.change_runs * len(study.changes)
 
     def run(self, chain: Chain, runner: Runner) -> PilotResult:
         """See :func:`pilot`."""
@@ -112,12 +112,12 @@ class PilotStage(Stage):
 
 def pilot(study: Study, profile: Profile, runner: Runner, bias: Bias) -> PilotResult:
     """Run the reference setting and the declared changes, choose the estimator and size the study."""
-    settings = [Setting("reference", {}, profile.pilot_runs)]
+    settings = [Setting("reference", {}, profile.pilot_runs, study.all_experiments)]
     settings += [Setting(name, values, profile.change_runs) for name, values in study.changes.items()]
     rows = runner.run("pilot", settings)
     target = study.targets[0].observable
     tables = {
-        setting.label: {e: responses([runs], e)[0] for e in study.estimators}
+        setting.label: {e: responses([runs], e)[0] for e in study.estimators if experiment_of(e) in setting.experiments}
         for setting, runs in zip(settings, rows, strict=True)
     }
     noise = {e: replicate_noise(values) for e, values in tables["reference"].items()}
@@ -171,7 +171,7 @@ def _choice(
     tables: Mapping[str, Mapping[str, FloatArray]], target: str, bias: Bias, notes: list[str]
 ) -> EstimatorChoice | None:
     """The choice among the estimators of the target's kind (an angle, or not); None where none can be made."""
-    candidates = [e for e in tables["reference"] if is_angle(e) == is_angle(target)]
+    candidates = [e for e in tables["reference"] if is_angle(e) == is_angle(target) and not experiment_of(e)]
     groups = {name: {e: table[e] for e in candidates} for name, table in tables.items()}
     centre = groups.pop("reference")
     readings = {e: [mean for mean, _ in found] for e, found in bias.items()}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from doe.stages.stage import Chain, Stage, ended
 from doe.studies.factors import MIN_BODIES, bodies_touched
 from doe.studies.profile import Profile
 from doe.studies.study import CALIBRATED, Factor, Study
-from doe.target import observed_text
+from doe.target import experiment_of, observed_text
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,8 @@ class ScreeningResult(Record):
     target_analysis: Screening
     no_pile_share: FloatArray
     no_pile_analysis: Screening | None
+    further_analyses: dict[str, Screening] = field(default_factory=dict)
+    """Of the targets beside the first: observable → analysis."""
     not_testable: tuple[NotTestable, ...]
     selected: tuple[Selected, ...]
 
@@ -84,11 +86,12 @@ def screening(study: Study, profile: Profile, runner: Runner, response: str) -> 
         runner,
         response,
         [entry.factor for entry in untestable],
+        [target.observable for target in study.targets[1:]],
     )
     estimated = {effect.name for effect in result.analysis.effects if not effect.is_dummy}
     exclude = [entry.factor for entry in untestable if entry.factor in estimated]
     fallback = [name for name in study.fallback if name in estimated]
-    selected = select_factors(result.analysis, CALIBRATED, fallback, exclude)
+    selected = select_factors(result.analysis, CALIBRATED, fallback, exclude, further=result.further_analyses)
     return dataclasses.replace(result, selected=selected)
 
 
@@ -109,12 +112,15 @@ def main_effects(
     runner: Runner,
     response: str,
     spare: Sequence[str] = (),
+    further: Sequence[str] = (),
 ) -> ScreeningResult:
     """Run the rows of a design and analyse response, target and share without a pile.
 
     Columns of its table without a factor are dummies. ``spare`` names factors that may be given up, see
-    :func:`analysed`.
+    :func:`analysed`. ``further``: observables that are analysed as well, in whichever experiment they are read.
     """
+    wanted = {"", *map(experiment_of, further)}
+    experiments = tuple(name for name in study.all_experiments if name in wanted)
     points = chosen.points(len(factors))
     dummies = [f"dummy {k + 1}" for k in range(points.unused.shape[1])]
     names = [factor.name for factor in factors] + dummies
@@ -124,6 +130,7 @@ def main_effects(
             f"row {k + 1}",
             {factor.path: factor.level(float(level)) for factor, level in zip(factors, row, strict=True)},
             replicates,
+            experiments,
         )
         for k, row in enumerate(points.coded)
     ]
@@ -138,6 +145,7 @@ def main_effects(
         runs=tuple(tuple(runs) for runs in rows),
         analysis=analysed(design, names, responses(rows, response), dummies, spare),
         target_analysis=analysed(design, names, responses(rows, study.targets[0].observable), dummies, spare),
+        further_analyses={name: analysed(design, names, responses(rows, name), dummies, spare) for name in further},
         no_pile_share=lost,
         no_pile_analysis=analyse_screening(design, names, lost[:, None], dummies) if lost.any() else None,
         not_testable=not_testable(study, factors),
@@ -188,7 +196,8 @@ class ScreeningStage(Stage):
 
     def planned_runs(self, study: Study, profile: Profile) -> int:
         """Every row of the design."""
-        return len(study.screening_design.points(len(study.factors)).coded) * profile.screening_replicates
+        rows = len(study.screening_design.points(len(study.factors)).coded)
+        return rows * profile.screening_replicates * len(study.all_experiments)
 
     def run(self, chain: Chain, runner: Runner) -> ScreeningResult:
         """See :func:`screening`; the estimator is the pilot's choice."""

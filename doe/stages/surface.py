@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from doe.analysis.canonical import Canonical, canonical_analysis
+from doe.analysis.joint_posterior import JointPosterior, joint_posterior
 from doe.analysis.optimum import Compromise, Optimum, find_compromise, find_optimum
 from doe.analysis.power import smallest_effect
 from doe.analysis.steepest_ascent import Region
@@ -47,12 +48,17 @@ class SurfaceResult(Record):
 
 @dataclass(frozen=True)
 class OptimumResult(Record):
-    """The chosen setting: path → value [SI], and how it was found (one target: ``single``, several: ``compromise``)."""
+    """The chosen setting: path → value [SI], and how it was found (one target: ``single``, several: ``compromise``).
+
+    ``posterior``: what all targets say together; None with more factors than it is computed for, and in results of
+    before there was one.
+    """
 
     values: dict[str, float]
     factors: tuple[Factor, ...]
     single: Optimum
     compromise: Compromise | None
+    posterior: JointPosterior | None = None
 
     @property
     def line(self) -> str:
@@ -72,6 +78,7 @@ def surface(
             f"point {k + 1}",
             {f.path: float(v) for f, v in zip(factors, point, strict=True)},
             profile.surface_replicates,
+            study.all_experiments,
         )
         for k, point in enumerate(natural)
     ]
@@ -116,6 +123,7 @@ def optimum(study: Study, fitted: SurfaceResult) -> OptimumResult:
         factors=fitted.factors,
         single=single,
         compromise=compromise,
+        posterior=joint_posterior(fitted.models, study.targets),
     )
 
 
@@ -127,7 +135,8 @@ class SurfaceStage(Stage):
 
     def planned_runs(self, study: Study, profile: Profile) -> int:
         """Every point of the design."""
-        return len(study.surface_design.points(CALIBRATED).coded) * profile.surface_replicates
+        points = len(study.surface_design.points(CALIBRATED).coded)
+        return points * profile.surface_replicates * len(study.all_experiments)
 
     def run(self, chain: Chain, runner: Runner) -> SurfaceResult:
         """See :func:`surface`; around where the ascent passed the target."""

@@ -44,7 +44,7 @@ class VerificationResult(Record):
 
 def verification(study: Study, profile: Profile, runner: Runner, values: dict[str, float]) -> VerificationResult:
     """Run the optimum with seeds that no other stage used and compare with the measurement."""
-    settings = (Setting("optimum", dict(values), profile.verification_runs),)
+    settings = (Setting("optimum", dict(values), profile.verification_runs, study.all_experiments),)
     rows = runner.run("verification", settings)
     tests = tuple(verify(responses(rows, t.observable)[0], t.mean, t.sd, t.n, margin=t.margin) for t in study.targets)
     return VerificationResult(
@@ -76,7 +76,7 @@ class VerificationStage(Stage):
 
     def planned_runs(self, study: Study, profile: Profile) -> int:
         """As the profile says."""
-        return profile.verification_runs
+        return profile.verification_runs * len(study.all_experiments)
 
     def run(self, chain: Chain, runner: Runner) -> VerificationResult:
         """See :func:`verification`."""

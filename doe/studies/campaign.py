@@ -1,4 +1,4 @@
-"""The whole chain of a study, pilot → screening → assumptions → scan → ascent → surface → optimum → verification.
+"""The whole chain of a study, pilot → reach → screening → … → verification (`doe.stages`).
 
 Whatever stages other packages add stand in it as well. While a stage runs, :class:`PartialStages` says what it would
 find if it ended now: its own analysis, over the runs that have ended so far.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from solver import ParameterError, Scene, body_counts, canonical, parameters, with_values
+from solver import ParameterError, Scene, body_counts, canonical, parameters, value, with_values
 
 MIN_BODIES = 5
 """A factor that touches fewer bodies than this cannot be tested: its effect is that of a handful of places."""
@@ -52,3 +52,8 @@ def bodies_touched(scene: Scene, path: str) -> float:
         one_component = len(names) == 2 and names[1] != "mass_fraction"
         return sum(n for body, n in number if not one_component or body.name == names[0])
     return math.inf
+
+
+def is_off(scene: Scene, path: str) -> bool:
+    """Whether the scene has the parameter and it is 0, as those of an effect that is off."""
+    return path in parameters(scene) and value(scene, path) == 0.0

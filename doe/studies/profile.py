@@ -37,3 +37,5 @@ class Profile(Record):
     resolution_deg: Annotated[float, Number(above=0.0)] | None = None
     """The pilot sizes the replicates so that this difference shows."""
     max_replicates: Annotated[int, Whole(1)] = 12
+    reach_runs: Annotated[int, Whole(0)] = 3
+    """Pours of each corner of the factors that shows whether the target can be reached; 0: none."""

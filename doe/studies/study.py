@@ -6,6 +6,7 @@ The designs of the stages are Plackett–Burman of 28 and of 12 runs and Box–B
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -21,7 +22,7 @@ from doe.errors import StatisticsError, StudyFileError
 from doe.record import Record
 from doe.studies.factors import MIN_BODIES, bodies_touched, checked_levels
 from doe.studies.profile import NAME, Profile
-from doe.target import Target, is_angle
+from doe.target import Target, experiment_of, is_angle
 from solver import (
     OBSERVABLES,
     EffectTables,
@@ -139,6 +140,9 @@ CALIBRATED = 3
 TRIES = 3
 """Seeds that are tried for one replicate; a run that jammed or broke is kept with its outcome and replaced."""
 
+EXPERIMENT = re.compile(r"[\w-]{1,60}")
+"""What an experiment may be called: its name stands before those of its observables."""
+
 Values = dict[str, float | str]
 
 
@@ -181,6 +185,13 @@ class Study:
     surface_design: ChosenDesign = SURFACE
     further: dict[str, Settings] = field(default_factory=dict)
     """Stage of another package → its table."""
+    experiments: dict[str, Scene] = field(default_factory=dict)
+    """Name → scene of each further experiment with the same material."""
+
+    @property
+    def all_experiments(self) -> tuple[str, ...]:
+        """Names of all experiments, "" for the study's own rig first."""
+        return ("", *self.experiments)
 
 
 class LevelsTable(TomlTable):
@@ -201,6 +212,15 @@ class ChangeTable(TomlTable):
     name: str
     values: Settings
     """Path → value."""
+
+
+class ExperimentTable(TomlTable):
+    """An ``[[experiment]]``: the same material in a further rig, read by targets such as "drum/dynamic_angle_deg"."""
+
+    name: str
+    rig: RigTable = Field(default_factory=dict)
+    insertion: InsertionTable = Field(default_factory=dict)
+    numerics: NumericsTable = Field(default_factory=dict)
 
 
 class ScanTable(TomlTable):
@@ -251,6 +271,7 @@ class StudyFile(TomlTable):
     screening: DesignTable = DesignTable()
     assumptions: DesignTable = DesignTable()
     surface: DesignTable = DesignTable()
+    experiment: list[ExperimentTable] = Field(default_factory=list)
     change: list[ChangeTable] = Field(default_factory=list)
     scan: ScanTable | None = None
     profile: dict[str, Profile] = Field(default_factory=dict)
@@ -280,6 +301,9 @@ def with_profile(study: Study, name: str) -> tuple[Study, Profile]:
     profile = study.profiles[name]
     mass = {"rig.mass": profile.mass} if "rig.mass" in parameters(study.scene) else {}
     scene = with_values(study.scene, {"body.spheres": profile.spheres, **mass})
+    experiments = {
+        name: with_values(other, {"body.spheres": profile.spheres}) for name, other in study.experiments.items()
+    }
     observable = study.targets[0].observable
     if profile.resolution_deg is not None and not is_angle(observable):
         raise ParameterError(
@@ -296,7 +320,7 @@ def with_profile(study: Study, name: str) -> tuple[Study, Profile]:
             f"{MIN_BODIES} bodies or more are needed"
         )
     _refuse_without_error(study, profile)
-    return replace(study, scene=scene), profile
+    return replace(study, scene=scene, experiments=experiments), profile
 
 
 def _refuse_without_error(study: Study, profile: Profile) -> None:
@@ -336,8 +360,20 @@ def study_from(table: Settings, path: Path) -> Study:
     if not file.target:
         raise StudyFileError("target: at least one [[target]] is needed")
     given = observable_names(scene)
+    experiments = _experiments(load_material(file.material, relative_to=path.parent), table, path, factors)
+    readings = [*given, *(f"{name}/{one}" for name, other in experiments.items() for one in observable_names(other))]
     for target in file.target:
-        one_of(target.observable, "target.observable", given)
+        one_of(target.observable, "target.observable", readings)
+    if experiment_of(file.target[0].observable):
+        raise StudyFileError(
+            f"target.observable: the first target, {file.target[0].observable}, leads the ascent and has to be of the "
+            f"study's own rig; allowed: {', '.join(given)}"
+        )
+    for name in experiments:
+        if name not in {experiment_of(target.observable) for target in file.target}:
+            raise StudyFileError(
+                f"experiment.name: no target reads {name}; name one, such as {name}/…, or leave it out"
+            )
     unasked = tuple(name for name in given if OBSERVABLES[name].estimator)
     estimators = unasked if file.estimators is None else file.estimators
     for name in estimators:
@@ -362,7 +398,32 @@ def study_from(table: Settings, path: Path) -> Study:
         assumption_design=assumed,
         surface_design=second_order_design(file.surface, "surface", SURFACE, CALIBRATED),
         further=_further(file.stage),
+        experiments=experiments,
     )
+
+
+def _experiments(material: Scene, table: Settings, path: Path, factors: Sequence[Factor]) -> dict[str, Scene]:
+    """The scene of each experiment: the study's material, contact and effects in a rig and with a mass of its own."""
+    found: dict[str, Scene] = {}
+    shared = {key: table[key] for key in ("contact", "effect") if key in table}
+    for entry in table.get("experiment", ()):
+        name, own = entry["name"], {key: value for key, value in entry.items() if key != "name"}
+        if not EXPERIMENT.fullmatch(name):
+            raise StudyFileError(f"experiment.name: {name!r} is no name; allowed: 1 to 60 letters, digits, - and _")
+        if name in found:
+            raise StudyFileError(f"experiment.name: {name!r} stands twice")
+        try:
+            other = with_set_up(material, shared | own, path.parent)
+        except ParameterError as error:
+            raise StudyFileError(f"experiment {name}: {error}") from None
+        for factor in factors:
+            if factor.path not in parameters(other):
+                raise StudyFileError(
+                    f"factor.path: {factor.path} of {factor.name} is no parameter of the experiment {name}; "
+                    "allowed are those that all experiments share, such as material.… and pair.…"
+                )
+        found[name] = with_values(other, {factor.path: factor.reference for factor in factors})
+    return found
 
 
 def _further(tables: dict[str, Settings]) -> dict[str, Settings]:

@@ -12,6 +12,7 @@ from doe.record import Document, Record
 from doe.run_records import Run, Setting
 from doe.stages.ascent import AscentResult
 from doe.stages.pilot import PilotResult
+from doe.stages.reach import ReachResult
 from doe.stages.scan import ScanResult
 from doe.stages.screening import ScreeningResult
 from doe.stages.stage import FurtherResult
@@ -24,6 +25,7 @@ from solver import ClumpFit, Outcome
 
 StageResult = (
     PilotResult
+    | ReachResult
     | ScreeningResult
     | ScanResult
     | AscentResult
@@ -87,6 +89,7 @@ class Stages(Record):
     """The result of every stage, in running order; None of one that has not ended, or that the study does not have."""
 
     pilot: PilotResult | None = None
+    reach: ReachResult | None = None
     screening: ScreeningResult | None = None
     assumptions: ScreeningResult | None = None
     scan: ScanResult | None = None
@@ -119,6 +122,10 @@ class Stages(Record):
         if found is None or isinstance(found, OptimumResult):
             return ()
         return (found.runs,) if isinstance(found, VerificationResult) else found.runs
+
+    def own_runs_of(self, stage: str) -> tuple[Run, ...]:
+        """Return the runs of a stage in the study's own rig."""
+        return tuple(run for runs in self.runs_of(stage) for run in runs if not run.experiment)
 
     def settings_of(self, stage: str) -> tuple[Setting, ...]:
         """Return the settings of a stage, in the order of ``runs_of``; empty also of results of older versions."""
@@ -194,7 +201,7 @@ class RunCounts(Record):
             valid=sum(run.valid for _, run in runs),
             by_outcome=dict(Counter(run.outcome for _, run in runs)),
             by_stage=dict(Counter(stage for stage, _ in runs)),
-            list=tuple(ListedRun(stage, run.label, run.seed, run.outcome, run.key) for stage, run in runs),
+            list=tuple(ListedRun(stage, run.title, run.seed, run.outcome, run.key) for stage, run in runs),
         )
 
     def outcomes(self) -> Mapping[str, Counter[str]]:
@@ -236,6 +243,8 @@ class StudyResult(AllStages, Described):
     about: About = field(default_factory=About)
     set_up: SetUp | None = None
     """None in results of before there was one."""
+    experiments: dict[str, SetUp] = field(default_factory=dict)
+    """Name → set-up of each further experiment."""
     piles: tuple[PouredPile, ...] = ()
     """At the reference setting and at the optimum; none of a rig without a free pile."""
 

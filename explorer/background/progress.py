@@ -47,7 +47,7 @@ class TriedRun(Record):
     def of(stage: str, run: Run | Ended) -> TriedRun:
         """What is told of a run."""
         return TriedRun(
-            stage, run.label, run.replicate, run.attempt, run.seed, str(run.outcome), run.message, run.valid
+            stage, run.title, run.replicate, run.attempt, run.seed, str(run.outcome), run.message, run.valid
         )
 
 

@@ -29,11 +29,14 @@ def calibrate(
     ),
     threads: int | None = typer.Option(None, min=1, help="CPU threads; all if not given."),
     tries: int = typer.Option(3, min=1, max=20, help="Seeds tried for one replicate that gives no valid pour."),
+    beyond_reach: bool = typer.Option(
+        False, "--beyond-reach", help="Go on where no setting of the factors comes near the target."
+    ),
     author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
     notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
     fail_above: float | None = typer.Option(None, min=0.0, help="Exit with 3 above this relative error in percent."),
 ) -> None:
-    """Calibrate a material: pilot, screening, ascent, response surface, optimum, verification, report."""
+    """Calibrate a material: pilot, reach, screening, ascent, response surface, optimum, verification, report."""
     from doe.errors import StudyStopped
     from explorer.errors import CommandError
     from explorer.study.run import StudyOrder, run_study
@@ -44,7 +47,9 @@ def calibrate(
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     one_file = record is not None and record.suffix == ".rrd"
     folder, piles = (None, record) if one_file else (record, None)
-    order = StudyOrder(study, profile, out, resume, store, folder, threads, tries, author, notes, target, piles)
+    order = StudyOrder(
+        study, profile, out, resume, store, folder, threads, tries, author, notes, target, beyond_reach, piles
+    )
     try:
         result = run_study(order, typer.echo)
     except StudyStopped as stopped:

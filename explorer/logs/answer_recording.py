@@ -169,10 +169,10 @@ def diagnosis_answer(result: DiagnosisResult) -> Answer:
 
 def study_answer(result: StudyResult) -> Answer:
     """What there is to record of a calibration."""
-    reference = [run for runs in result.runs_of("pilot") for run in runs if run.label == REFERENCE]
+    reference = [run for run in result.own_runs_of("pilot") if run.label == REFERENCE]
     poured: dict[str, tuple[str, Sequence[Run]]] = {
         DECLARED: ("pilot", reference),
-        OPTIMUM: ("verification", result.verification.runs),
+        OPTIMUM: ("verification", result.own_runs_of("verification")),
     }
     scenes = {name: scene_of(result, stage, runs[0]) for name, (stage, runs) in poured.items() if runs}
     changed = () if all(same for _, same in scenes.values()) else ("Program, study or material have changed since.",)

@@ -79,7 +79,7 @@ def _study_runs(result: StudyResult) -> DataTable:
     paths = sorted({path for values in settings.values() for path in values})
     rows = tuple(
         (
-            *(stage, run.label, run.replicate, run.attempt, run.seed, run.outcome, run.key),
+            *(stage, run.title, run.replicate, run.attempt, run.seed, run.outcome, run.key),
             *(settings.get((stage, run.label), {}).get(path) for path in paths),
             *(run.observables.get(name) for name in observables),
         )

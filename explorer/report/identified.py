@@ -1,7 +1,8 @@
 """What a target says of each factor: its value where the target identifies it, else the range that gives the target.
 
 The optimum is one point that a rule picks among all settings that give the target. Its 95 % set tells how far that pick
-scatters from refit to refit; it tells what is known of a factor only where the target identifies the factor.
+scatters from refit to refit; it tells what is known of a factor only where the target identifies the factor. Of several
+targets the joint posterior says both: the 95 % interval of each factor, and whether that leaves it open.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from explorer.report.content import Strong
 from explorer.units import MISSING, enumeration, parameter_label, parameter_range, parameter_value, percent
 
 BY_RULE = "chosen by rule"
+CONTRADICTION = 0.01
+"""Below this chance of their misfit several targets contradict each other, and identify nothing."""
 GIVES_TARGET = "range that gives the target"
 """What `Setting.feasible` is called in tables and charts."""
 
@@ -24,7 +27,8 @@ class FactorSetting:
     """One factor at the optimum, in words.
 
     ``chosen``: the value. ``confidence_set``: its 95 % set, a dash where the factor is not identified. ``feasible``:
-    the range over which the model gives the target, ``feasible_share``: the part of the region that it takes.
+    the range over which the model gives the target (several targets: the 95 % interval of their posterior),
+    ``feasible_share``: the part of the region that it takes.
     """
 
     name: str
@@ -74,7 +78,7 @@ def is_identified(single: Optimum, k: int) -> bool:
 
 def all_identified(optimum: OptimumResult) -> bool:
     """Whether the target identifies every factor, so that the point is more than a choice."""
-    return all(is_identified(optimum.single, k) for k in range(len(optimum.factors)))
+    return all(one.identified for one in settings(optimum))
 
 
 def rule(optimum: OptimumResult, reference: str) -> str:
@@ -100,16 +104,18 @@ def cloud_caution(optimum: OptimumResult) -> str:
 
 def _setting(optimum: OptimumResult, k: int) -> FactorSetting:
     single, factor = optimum.single, optimum.factors[k]
-    path, identified = factor.path, is_identified(single, k)
+    path, identified, share = factor.path, is_identified(single, k), float(single.solution_share[k])
     low, high = float(single.solution_low[k]), float(single.solution_high[k])
+    ends = float(single.point_low[k]), float(single.point_high[k])
+    if optimum.compromise is not None and (joint := optimum.posterior) is not None:
+        low, high = ends = float(joint.low[k]), float(joint.high[k])
+        identified, share = joint.identified[k] and joint.p >= CONTRADICTION, float(joint.share[k])
     return FactorSetting(
         name=factor.name,
         label=parameter_label(path),
         identified=identified,
         chosen=parameter_value(path, optimum.values[path]),
-        confidence_set=parameter_range(path, float(single.point_low[k]), float(single.point_high[k]))
-        if identified
-        else MISSING,
+        confidence_set=parameter_range(path, *ends) if identified else MISSING,
         feasible=parameter_range(path, low, high),
-        feasible_share=MISSING if math.isnan(low) else percent(float(single.solution_share[k])),
+        feasible_share=MISSING if math.isnan(low) else percent(share),
     )

@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from doe.provenance import SetUp
 from doe.studies.study_result import StudyResult
 from explorer.report.content import Bullets, Reference, Section, Text
 from explorer.units import (
@@ -173,9 +174,16 @@ def _model(result: StudyResult) -> str:
 
 
 def _rig(result: StudyResult) -> str:
-    found = result.set_up
-    if found is None:
+    if result.set_up is None:
         return ""
+    text = _one_rig(result.set_up)
+    for name, other in result.experiments.items():
+        words = _one_rig(other)
+        text += f" In the experiment {name.replace('_', ' ')}, {words[0].lower()}{words[1:]}"
+    return text
+
+
+def _one_rig(found: SetUp) -> str:
     sizes = [
         f"{parameter_label(path)} {parameter_value(path, one)}"
         for path, one in found.values.items()

@@ -7,7 +7,7 @@ plane y = 0, so that any rig, also one of a plug-in, is drawn as it stands befor
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from html import escape
 from itertools import pairwise
@@ -47,22 +47,27 @@ def set_up_of(scene: Scene) -> SetUp:
     return SetUp(scene.rig.name, scene.rig.wall, time_step(actual(scene)), found, materials)
 
 
-def set_up(found: SetUp | None, assumed: Sequence[str]) -> Section | None:
-    """Rig, materials, pairs and bodies; None for a result of before it was kept."""
+def set_up(found: SetUp | None, assumed: Sequence[str], experiments: Mapping[str, SetUp]) -> Section | None:
+    """Rig of the study and of each further experiment, materials, pairs, bodies; None of before they were kept."""
     if found is None:
         return None
-    blocks: list[Block] = [
-        Text(
-            f"Rig: {found.rig.replace('_', ' ')}; {parameter_value('rig.mass', found.values['rig.mass'])} poured; "
-            f"time step {number(1e6 * found.dt)} µs. Values at the reference setting; those of the factors are varied."
-            if "rig.mass" in found.values
-            else f"Rig: {found.rig.replace('_', ' ')}; time step {number(1e6 * found.dt)} µs."
-        )
-    ]
-    drawing = rig_drawing(found)
-    blocks += [] if drawing is None else [drawing]
+    blocks = _rig("Rig", found)
+    for name, other in experiments.items():
+        blocks += _rig(f"Experiment {name.replace('_', ' ')}", other)
     blocks += material_tables(found, assumed)
     return Section("Set-up and material", tuple(blocks))
+
+
+def _rig(words: str, found: SetUp) -> list[Block]:
+    """A rig in a line, and its drawing."""
+    text = (
+        f"{words}: {found.rig.replace('_', ' ')}; {parameter_value('rig.mass', found.values['rig.mass'])} poured; "
+        f"time step {number(1e6 * found.dt)} µs. Values at the reference setting; those of the factors are varied."
+        if "rig.mass" in found.values
+        else f"{words}: {found.rig.replace('_', ' ')}; time step {number(1e6 * found.dt)} µs."
+    )
+    drawing = rig_drawing(found)
+    return [Text(text), *([] if drawing is None else [drawing])]
 
 
 def material_tables(found: SetUp, assumed: Sequence[str]) -> list[Table]:

@@ -15,6 +15,7 @@ from doe.studies.study_result import AnyStudy
 from explorer.report.content import Spec
 from explorer.report.figures.effects import all_effects, errors_at_hand, half_normal, main_effects, pareto_against
 from explorer.report.figures.model import FittedTarget, cloud, fitted_targets, ranges
+from explorer.report.figures.posterior import corner, overlaid
 from explorer.report.figures.pours import ascent_path, noise_of_estimators, scan, verification
 from explorer.report.figures.style import short_rows, stacked
 from explorer.report.figures.surface import contours, fit, height_over, residual_quantiles, solutions
@@ -106,8 +107,18 @@ def surface_plots(fitted: FittedTarget, of: str = "") -> Named:
 
 
 def _optimum(result: AnyStudy) -> Named:
-    if result.optimum is not None:
-        yield from optimum_plots(fitted_targets(result)[0], result.optimum)
+    found = result.optimum
+    if found is None:
+        return
+    targets = fitted_targets(result)
+    if len(targets) > 1:
+        caption = "Full: the model gives the target; dotted: ± margin; filled: every target within its margin."
+        yield "Targets over each other", Plot(lambda: stacked(overlaid(targets)), caption, 2.2)
+    if (joint := found.posterior) is not None:
+        told = "all targets leave" if len(targets) > 1 else "the target leaves"
+        caption = f"What {told} of the factors on the fitted surface; bands: 95 %; darker: likelier."
+        yield "Posterior of the factors", Plot(partial(corner, joint, found.factors), caption, 0.95)
+    yield from optimum_plots(targets[0], found)
 
 
 def optimum_plots(fitted: FittedTarget, optimum: OptimumResult) -> Named:

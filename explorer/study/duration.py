@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 import os
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from doe.stages import planned_runs
-from doe.store import Store, StoreError
+from doe.store import RIG, Store, StoreError
 from doe.studies.profile import Profile
 from doe.studies.study import Study, with_profile
-from solver import body_counts, parameters, value
+from solver import body_counts, parameters, pour_rig, value
 from solver.scenes.time_step import time_step
 
 FEWEST = 3
@@ -45,18 +46,23 @@ def duration_text(study: Study, profile: Profile, store: Path, workers: int | No
     without a pile come on top.
     """
     workers = workers or os.cpu_count() or 1
-    runs = sum(planned_runs(study, profile).values())
+    counts = runs_of_scenes(study, profile)
+    runs = sum(counts.values())
     least = "" if profile.resolution_deg is None else "at least "  # the pilot may ask for more
     memory = f"{workers * WORKER_GB:.1f} GB of memory"
     pours = f"{least}{runs} runs of {profile.spheres} shapes"
-    took = stored_times(study, profile, store)
-    if len(took) < FEWEST:
-        mean = reckoned_time(study, profile)
+    took = {name: stored_times(study, profile, store, name) for name in counts}
+    known = {name: len(times) >= FEWEST for name, times in took.items()}
+    means = {
+        name: float(np.mean(times)) if known[name] else reckoned_time(study, profile, name)
+        for name, times in took.items()
+    }
+    mean = sum(counts[name] * means[name] for name in counts) / runs
+    if not all(known.values()):
         told = f"{mean:.0f} s a pour, from spheres and steps, to a factor of two; none of its kind is stored yet"
         about = "roughly"
     else:
-        mean = float(np.mean(took))
-        told, about = f"{mean:.1f} s a pour, mean of {len(took)} stored ones", "about"
+        told, about = f"{mean:.1f} s a pour, mean of {sum(map(len, took.values()))} stored ones", "about"
     if not math.isfinite(mean):
         return f"{pours}, {memory}; how long is told after the first pours: none of its kind is stored yet."
     minutes = runs * mean / workers / 60.0
@@ -65,25 +71,42 @@ def duration_text(study: Study, profile: Profile, store: Path, workers: int | No
     return f"{pours}, {least}{about} {time} on {cores} ({told}), {memory}."
 
 
-def reckoned_time(study: Study, profile: Profile) -> float:
-    """Time of one pour [s]: spheres × steps / ``PACE``, from the first body's entry to rest; NaN without a feed."""
+def runs_of_scenes(study: Study, profile: Profile) -> dict[str, int]:
+    """Planned runs in the study's own rig, under "", and in each further experiment: all of those have as many."""
+    every = sum(planned_runs(study, profile).values())
+    own = sum(planned_runs(replace(study, experiments={}), profile).values())
+    others = {name: (every - own) // len(study.experiments) for name in study.experiments}
+    return {"": own} | others
+
+
+def reckoned_time(study: Study, profile: Profile, experiment: str = "") -> float:
+    """Time of one pour [s]: spheres × steps / ``PACE``, from the first body's entry to the end; NaN without a feed."""
     try:
-        scene = with_profile(study, profile.name)[0].scene
+        sized = with_profile(study, profile.name)[0]
     except ValueError:  # a profile that this study cannot have, which is told where it is started
         return math.nan
-    if not {"rig.mass", "insertion.rate"} <= set(parameters(scene)):
+    scene = sized.experiments[experiment] if experiment else sized.scene
+    if "insertion.rate" not in parameters(scene):
         return math.nan
-    spheres = sum(n * len(body.clump.radii) for n, body in zip(body_counts(scene), scene.bodies, strict=True))
-    simulated = float(value(scene, "rig.mass")) / float(value(scene, "insertion.rate")) + SETTLING
+    counts = body_counts(scene)
+    spheres = sum(n * len(body.clump.radii) for n, body in zip(counts, scene.bodies, strict=True))
+    if "rig.mass" in parameters(scene):
+        mass = float(value(scene, "rig.mass"))
+    else:
+        mass = sum(n * body.mass for n, body in zip(counts, scene.bodies, strict=True))
+    simulated = mass / float(value(scene, "insertion.rate")) + SETTLING + (pour_rig(scene).running_time or 0.0)
     return spheres * simulated / time_step(scene) / PACE
 
 
-def stored_times(study: Study, profile: Profile, store: Path) -> list[float]:
-    """Wall times [s] of the stored pours of ``study`` with the shapes and the mass of ``profile``."""
+def stored_times(study: Study, profile: Profile, store: Path, experiment: str = "") -> list[float]:
+    """Wall times [s] of the stored pours of ``study`` with the shapes of ``profile``, in the rig and with the mass."""
     if not store.is_file():
         return []
+    scene = study.experiments[experiment] if experiment else study.scene
+    mass = float(value(scene, "rig.mass")) if experiment and "rig.mass" in parameters(scene) else profile.mass
+    wanted: dict[str, float | str] = {RIG: scene.rig.name, "body.spheres": profile.spheres, "rig.mass": mass}
     try:
         with closing(Store(store, pouring=False)) as kept:
-            return kept.wall_times(study.name, {"body.spheres": profile.spheres, "rig.mass": profile.mass})
+            return kept.wall_times(study.name, wanted)
     except StoreError:
         return []  # told where it is used

@@ -79,6 +79,8 @@ class StudyOrder:
     notes: str = ""
     target: Path | None = None
     """Folder of photographs that take the place of the study's own angle of repose (`explorer.photograph.target`)."""
+    beyond_reach: bool = False
+    """Leave out the stage that stops a study whose target no setting comes near."""
     piles: Path | None = None
     """New file for the answer as a recording; ``record``: folder for all pours of the verification."""
 
@@ -90,6 +92,8 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
     result that stands in the folder already, if there is one, is only recorded.
     """
     study, profile = with_profile(load_study(order.study), order.profile)
+    if order.beyond_reach:
+        profile = replace(profile, reach_runs=0)
     if order.piles is not None:
         check_new_file(order.piles, suffix=".rrd")
         if (finished := None if order.resume else _finished(order.out, study.file, profile.name)) is not None:
@@ -136,6 +140,7 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
             observer=recorder,
             pours=pool.run_queue if pool else None,
             tries=order.tries,
+            experiments=study.experiments,
         )
         bias = estimator_bias(study.estimators)
         found = run_campaign(study, profile, runner, bias, progress.stage, follower.begin, partial.keep)
@@ -158,8 +163,8 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
 def poured_piles(stages: Stages, store: Store) -> tuple[PouredPile, ...]:
     """Mean silhouettes at the reference setting and at the optimum, read off the stored pours; none that are lost."""
     chosen = (
-        ("reference", [run for runs in stages.runs_of("pilot") for run in runs if run.label == REFERENCE]),
-        ("optimum", [run for runs in stages.runs_of("verification") for run in runs]),
+        ("reference", [run for run in stages.own_runs_of("pilot") if run.label == REFERENCE]),
+        ("optimum", stages.own_runs_of("verification")),
     )
     seen = [
         (name, [views for run in runs if run.valid and (views := _silhouettes(store.find(run.key)))])
@@ -282,4 +287,5 @@ def result_of(
         shapes=tuple(PouredBody(body.name, body.mass, body.spheres, body.clump.fit) for body in study.scene.bodies),
         about=about,
         set_up=set_up_of(study.scene),
+        experiments={name: set_up_of(scene) for name, scene in study.experiments.items()},
     )

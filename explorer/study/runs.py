@@ -39,5 +39,6 @@ def scene_of(result: AnyStudy, stage: str, run: Run) -> tuple[Scene, bool]:
     profile = result.study.profile
     study = replace(load_study(result.study.file), profiles={profile.name: profile})
     study, _ = with_profile(study, profile.name)
-    scene = with_values(study.scene, settings_of(result, stage, run.label))
+    scene = study.experiments[run.experiment] if run.experiment else study.scene
+    scene = with_values(scene, settings_of(result, stage, run.label))
     return scene, pour_key(scene, run.seed) == run.key

@@ -10,7 +10,7 @@ import trimesh
 from doe.pour_runner import TRIES, PourRunner, seed_of
 from doe.run_records import Run, Setting, no_pile_shares, responses
 from doe.store import Store, StoreError
-from solver import load_material, with_values
+from solver import load_material, pour_key, with_rig, with_values
 from solver.observables import OBSERVABLES, Observable, Value
 from solver.rigs import Funnel
 from solver.shapes.solid import Solid
@@ -33,6 +33,12 @@ def test_seeds_differ_and_repeat():
     }
     assert len(seeds) == 2 * 9 * 3 * 3
     assert seed_of(1, "a", 2, 1, 0) == seed_of(1, "a", 2, 1, 0) != seed_of(2, "a", 2, 1, 0)
+
+
+def test_seeds_of_the_own_rig_are_those_of_numpy_s_sequence_without_an_experiment():
+    entropy = [3, *b"pilot", 2, 1, 0]
+    assert seed_of(3, "pilot", 2, 1, 0) == np.random.SeedSequence(entropy).generate_state(1)[0]
+    assert seed_of(3, "pilot", 2, 1, 0, "drum") != seed_of(3, "pilot", 2, 1, 0)
 
 
 def test_a_failed_run_counts_for_the_no_pile_share_and_not_for_the_response():
@@ -74,6 +80,53 @@ def test_pours_are_stored_reused_and_replaced(tmp_path):
     more = PourRunner(scene, store, "test", 1, tries=TRIES + 1).run("stage", settings)
     assert [run.attempt for run in more[1]] == list(range(TRIES + 1))
     assert [run.reused for run in more[1]] == [True] * TRIES + [False]
+
+
+def made_up(queue, room):
+    """In place of pours: an empty pile of each job."""
+    while queue:
+        yield queue.popleft(), record_of(empty_pile(), np.zeros(1), np.zeros(1), poured_mass=1.0)
+
+
+def test_every_experiment_is_poured_under_seeds_keys_and_labels_of_its_own(tmp_path):
+    own = with_values(load_material("sunflower_extract"), TINY)
+    drum = with_values(with_rig(load_material("sunflower_extract"), "rotating_drum"), {"body.spheres": "coarse"})
+    settings = [
+        Setting("both", {"pair.seed.seed.static_friction": 0.5}, 2, ("", "drum")),
+        Setting("own", {"rig.outlet_height": 0.06}, 1),
+    ]
+    plain = [Setting(one.label, one.values, one.replicates) for one in settings]
+    with closing(Store(tmp_path / "plain.sqlite")) as store:
+        before = PourRunner(own, store, "test", 1, pours=made_up, tries=1).run("stage", plain)
+    with closing(Store(tmp_path / "runs.sqlite")) as store:
+        rows = PourRunner(own, store, "test", 1, pours=made_up, tries=1, experiments={"drum": drum}).run(
+            "stage", settings
+        )
+        # The own rig's runs are what they were before there was another.
+        kept = [[run for run in runs if not run.experiment] for runs in rows]
+        assert [[(run.seed, run.key) for run in runs] for runs in kept] == [
+            [(run.seed, run.key) for run in runs] for runs in before
+        ]
+        assert [(run.experiment, run.replicate, run.title) for run in rows[0]] == [
+            ("", 0, "both"),
+            ("", 1, "both"),
+            ("drum", 0, "both, drum"),
+            ("drum", 1, "both, drum"),
+        ]
+        assert [run.experiment for run in rows[1]] == [""]
+        for run in rows[0][2:]:
+            scene = with_values(drum, settings[0].values)
+            assert run.seed == seed_of(1, "stage", 0, run.replicate, 0, "drum")
+            assert run.key == pour_key(scene, run.seed)
+            assert store.find(run.key).parameters["rig.name"] == "rotating_drum"
+            assert {name.partition("/")[0] for name in run.observables} <= {"drum"}
+        assert {run.label for run in store.runs()} == {"both", "both, drum", "own"}
+        again = PourRunner(own, store, "test", 1, pours=never, tries=1, experiments={"drum": drum}).run(
+            "stage", settings
+        )
+        assert [[(run.key, run.reused) for run in runs] for runs in again] == [
+            [(run.key, True) for run in runs] for runs in rows
+        ]
 
 
 def never(queue, room):

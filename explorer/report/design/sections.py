@@ -20,7 +20,7 @@ from explorer.report.design.model import blend_words, diagnostics, effects, mixt
 from explorer.report.figures.model import cloud, ranges
 from explorer.report.figures.surface import solutions
 from explorer.report.identified import GIVES_TARGET, cloud_caution, rule, settings
-from explorer.report.sections.answer import ranges_caption
+from explorer.report.sections.optimum import ranges_caption
 from explorer.report.sections.surface import equation
 from explorer.units import (
     MISSING,

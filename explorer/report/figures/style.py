@@ -68,7 +68,7 @@ def axis(title: str, **more: Any) -> Json:
 def side_by_side(panels: int, gap: float = 0.06) -> list[list[float]]:
     """Domains of ``panels`` charts in a row."""
     width = (1.0 - gap * (panels - 1)) / panels
-    return [[k * (width + gap), k * (width + gap) + width] for k in range(panels)]
+    return [[k * (width + gap), min(1.0, k * (width + gap) + width)] for k in range(panels)]
 
 
 def stacked(spec: Spec, gap: float = 0.16) -> Spec:

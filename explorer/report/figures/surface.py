@@ -46,7 +46,7 @@ def contours(fitted: FittedTarget) -> Spec:
     """
     unit, factors, region = unit_of_observable(fitted.observable), fitted.factors, fitted.model.region
     pairs = list(combinations(range(len(factors)), 2))
-    grids = [_slice(fitted, i, j, GRID) / unit.size for i, j in pairs]
+    grids = [section(fitted, i, j, GRID) / unit.size for i, j in pairs]
     level = float(np.mean(grids)) if fitted.target is None else unit.of(fitted.target)
     reach = max(float(np.abs(grid - level).max()) for grid in grids) or 1.0
     domains = side_by_side(len(pairs), 0.1)
@@ -85,8 +85,8 @@ def contours(fitted: FittedTarget) -> Spec:
     return chart(traces, layout, 420)
 
 
-def _slice(fitted: FittedTarget, i: int, j: int, side: int) -> Array:
-    """The model on a grid over factors i (columns) and j (rows), ``side`` points each, the others at the section."""
+def section(fitted: FittedTarget, i: int, j: int, side: int) -> Array:
+    """The model [SI] on a grid over factors i (columns), j (rows), ``side`` points each, the others at the section."""
     fixed = fitted.model.region.coded(fitted.section_point)
     coded = np.broadcast_to(fixed, (side, side, fixed.size)).copy()
     coded[..., i], coded[..., j] = np.meshgrid(np.linspace(-1, 1, side), np.linspace(-1, 1, side))
@@ -170,7 +170,7 @@ def height_over(fitted: FittedTarget, pair: tuple[int, int]) -> Spec:
     """The model over two factors, the others at the optimum, with the observed runs above it."""
     model, region, unit, (i, j) = fitted.model, fitted.model.region, unit_of_observable(fitted.observable), pair
     sides = np.linspace(-1.0, 1.0, SOLID_GRID)
-    heights = _slice(fitted, i, j, SOLID_GRID) / unit.size
+    heights = section(fitted, i, j, SOLID_GRID) / unit.size
     level = float(heights.mean()) if fitted.target is None else unit.of(fitted.target)
     reach = max(float(np.abs(heights - level).max()), 1e-9)
     sizes = [unit_of_parameter(fitted.factors[k].path).size for k in pair]

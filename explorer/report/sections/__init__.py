@@ -7,16 +7,17 @@ from collections.abc import Callable
 from doe.studies.study_result import StudyResult
 from explorer.report.content import Section
 from explorer.report.methods import study_methods
-from explorer.report.sections.answer import effects, optimum, overview, parameters, piles, verification
+from explorer.report.sections.answer import effects, overview, parameters, piles, verification
 from explorer.report.sections.closing import further, paper, repeat, runs
-from explorer.report.sections.designs import assumptions, noise, scan, screening
+from explorer.report.sections.designs import assumptions, noise, reach, scan, screening
+from explorer.report.sections.optimum import optimum
 from explorer.report.sections.surface import ascent, surface
 from explorer.report.set_up import set_up
 
 
 def materials(result: StudyResult) -> Section | None:
     """What was poured into what."""
-    return set_up(result.set_up, result.study.assumed)
+    return set_up(result.set_up, result.study.assumed, result.experiments)
 
 
 def methods(result: StudyResult) -> Section:
@@ -32,6 +33,7 @@ STAGES_FOUND: tuple[Callable[[StudyResult], Section | None], ...] = (
     verification,
     effects,
     noise,
+    reach,
     screening,
     assumptions,
     scan,

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import math
 
-from doe.analysis.optimum import Compromise
 from doe.analysis.screening import SIGNIFICANT
 from doe.analysis.t_tests import Sample
 from doe.analysis.verification import Verification
 from doe.stages.screening import ScreeningResult
-from doe.stages.surface import OptimumResult
 from doe.stages.verification import VerificationResult
 from doe.studies.factors import MIN_BODIES
 from doe.studies.study_result import StudyResult, valid_runs
 from doe.target import Target
 from explorer.report.content import Banner, Block, Caution, Facts, Figure, Section, Strong, Struck, Table, Text, Word
 from explorer.report.figures.effects import all_effects
-from explorer.report.figures.model import cloud, fitted_targets, ranges
 from explorer.report.figures.pours import pile_outlines
 from explorer.report.figures.pours import verification as verification_chart
-from explorer.report.identified import BY_RULE, GIVES_TARGET, cloud_caution, is_identified, rule, settings
+from explorer.report.identified import BY_RULE, settings
 from explorer.units import (
     MISSING,
     code,
@@ -31,29 +28,34 @@ from explorer.units import (
     observed,
     p_value,
     parameter_label,
-    parameter_range,
-    parameter_value,
     percent,
-    signed,
     unit_of_observable,
 )
 
 
 def banner(result: StudyResult) -> Banner:
     """Whether the material is calibrated: fresh pours decide, and a surface that is mere noise decides nothing."""
-    target, test, single = result.study.targets[0], result.verification.tests[0], result.optimum.single
+    single, tests = result.optimum.single, result.verification.tests
+    verdicts = {one.verdict for one in tests}
+    # Of several targets the one speaks that is missed, else the first that stays open, else the first.
+    telling = next((word for word in ("different", "cannot tell") if word in verdicts), "equivalent")
+    index = next((k for k, one in enumerate(tests) if one.verdict == telling), 0)
+    target, test = result.study.targets[index], tests[index]
     name = target.observable
+    of = f" of the {observable_label(name)}" if len(tests) > 1 else ""
     poured = (
         f"{test.simulated.n} fresh pours at the chosen setting gave {observed(name, test.simulated.mean)} against "
-        f"{observed(name, target.mean)} measured"
+        f"{observed(name, target.mean)} measured{of}"
     )
-    verdicts = {one.verdict for one in result.verification.tests}
-    reach = f"{observed(name, single.reachable_low)} … {observed(name, single.reachable_high)}"
+    ends = (observed(result.study.targets[0].observable, end) for end in (single.reachable_low, single.reachable_high))
+    reach = " … ".join(ends)
     if not single.reached and verdicts != {"equivalent"}:
+        first = result.study.targets[0].observable
         return Banner(
             Word.OUT_OF_REACH,
             "",
-            f"No setting of the region gives {observed(name, target.mean)}: the model reaches {reach}, and {poured}.",
+            f"No setting of the region gives {observed(first, single.target)}: the model reaches {reach}, and "
+            f"{poured}.",
             "Widen the ranges of the factors that act, or add a factor that is missing: for round bodies rolling "
             "resistance, `effect.rolling_resistance.rolling_friction`.",
         )
@@ -132,7 +134,7 @@ def overview(result: StudyResult) -> Section:
 def cautions(result: StudyResult) -> list[str]:
     """What keeps the numbers of this study from meaning more than they do, one sentence each."""
     found = []
-    fallback = [s.name for s in result.screening.selected if s.reason != SIGNIFICANT]
+    fallback = [s.name for s in result.screening.selected if not s.reason.startswith(SIGNIFICANT)]
     if fallback:
         found.append(
             f"{enumeration(fallback)} went on without being significant, in the order of the study's fallback list; "
@@ -421,104 +423,3 @@ def effects(result: StudyResult) -> Section:
     if any(part is not None and part.not_testable for part in (result.screening, result.assumptions)):
         caption += f" Not testable: acts on fewer than {MIN_BODIES} bodies."
     return Section(title, (*blocks, Figure("effects", all_effects(result.screening, result.assumptions), caption)))
-
-
-def optimum(result: StudyResult) -> Section:
-    """Chosen setting, the 95 % sets of identified parameters and the ranges that give the target."""
-    found, single, first = result.optimum, result.optimum.single, fitted_targets(result)[0]
-    blocks: list[Block] = [Text(_statement(result)), _settings(result, first.reference_name)]
-    if found.compromise is not None:
-        blocks += _compromise(result, found.compromise)
-    blocks += [
-        Figure("ranges", ranges(first), ranges_caption(found)),
-        Figure(
-            "cloud",
-            cloud(first),
-            f"n = {len(single.bootstrap_points)} refits to resampled {single.resampling} (bootstrap); each dot is the "
-            "solution "
-            f"nearest the measured parameters. {percent(single.share_reached)} of the refits reach the target. "
-            f"{cloud_caution(found)}".rstrip(),
-        ),
-    ]
-    return Section("Optimum", tuple(blocks))
-
-
-def ranges_caption(found: OptimumResult) -> str:
-    """What the bars of the ranges are."""
-    return (
-        "The narrower a bar, the better a factor is known: wide, the region of the surface; middle, where the fitted "
-        f"model gives the target; narrow, the 95 % set over n = {len(found.single.bootstrap_points)} bootstrap refits."
-    )
-
-
-def _statement(result: StudyResult) -> str:
-    single = result.optimum.single
-    name = result.study.targets[0].observable
-    between = f"{observed(name, single.predicted_low)} … {observed(name, single.predicted_high)}"
-    if single.reached:
-        text = (
-            f"Of all settings at which the model gives {observed(name, single.target)}, this one is nearest the "
-            f"measured parameters (distance {fixed(single.distance)} half-widths); the model's 95 % interval there "
-            f"is {between}."
-        )
-    else:
-        text = (
-            f"The model does not give {observed(name, single.target)} in its region; it comes nearest with "
-            f"{observed(name, single.predicted)} ({between})."
-        )
-    if single.unidentified:
-        text += (
-            f" The target does not identify {enumeration(single.unidentified)}: the answer is the range that gives "
-            "the target, and the value in it is chosen by rule."
-        )
-    text += (
-        f" In {percent(single.compatible_share)} of the region the predicted mean is compatible with the target "
-        "at 95 %."
-    )
-    error = single.target_standard_error
-    any_identified = any(is_identified(single, k) for k in range(len(single.names)))
-    including = "The 95 % set and this share include" if any_identified else "This share includes"
-    text += (
-        f" {including} the target's own standard error, {observed(name, error)}."
-        if error
-        else " The target is taken as exact: the study states no standard deviation and number of measurements."
-    )
-    if not single.better_than_noise:
-        text += " The surface is not better than noise, so this point is not a calibration."
-    return text
-
-
-def _settings(result: StudyResult, reference_name: str) -> Table:
-    found, good = result.optimum, holds(result)
-    rows = tuple(
-        (
-            *(cell if good or k < ANSWER or cell == MISSING else Struck(cell) for k, cell in enumerate(setting.cells)),
-            parameter_value(factor.path, factor.reference),
-            parameter_range(factor.path, factor.low, factor.high),
-        )
-        for setting, factor in zip(settings(found), found.factors, strict=True)
-    )
-    header = (
-        *("factor", "parameter", "identified", GIVES_TARGET, "of the region", "optimum", "95 % set"),
-        *("measured", "screened"),
-    )
-    first_alone = "Intervals and ranges of the first target alone." if found.compromise is not None else ""
-    return Table(header, rows, f"{rule(found, reference_name)} {first_alone}".strip())
-
-
-def _compromise(result: StudyResult, compromise: Compromise) -> list[Block]:
-    rows = tuple(
-        (
-            observable_label(target.observable),
-            observed(target.observable, target.mean),
-            observed(target.observable, predicted),
-            signed(missed),
-            fixed(target.weight),
-        )
-        for target, predicted, missed in zip(
-            result.study.targets, compromise.predicted, compromise.standardised, strict=True
-        )
-    )
-    header = ("target", "measured", "model at the optimum", "missed by [standard errors]", "weight")
-    text = f"Several targets: the setting of least weighted misfit J = {fixed(compromise.misfit)}."
-    return [Text(f"{text} {compromise.statement}"), Table(header, rows)]

@@ -83,6 +83,24 @@ def noise(result: StudyResult) -> Section:
     return Section("Noise of one pour", tuple(blocks))
 
 
+def reach(result: StudyResult) -> Section | None:
+    """The two corners of the factors of known direction; None where they were not poured."""
+    found = result.reach
+    if found is None:
+        return None
+    rows = tuple(
+        (setting.label, str(one.n), observed(found.observable, one.mean), observed(found.observable, error))
+        for setting, one, error in zip(found.settings, found.corners, found.standard_errors, strict=True)
+    )
+    caption = (
+        f"Friction and rolling friction up, restitution down, of {enumeration(found.factors)}; the others at their "
+        "reference. Out of reach is a target ± 2 standard errors that lies beyond the nearer mean by more than the "
+        "whole range between the two, and by more than 3 standard errors."
+    )
+    table = Table(("corner", "valid pours", observable_label(found.observable), "standard error"), rows, caption)
+    return Section("Reach", (Text(f"{found.line[0].upper()}{found.line[1:]}."), table))
+
+
 def _estimators(pilot: PilotResult) -> Table:
     choice, bias = pilot.choice, pilot.estimator_bias
     changes = [] if choice is None else list(dict.fromkeys(s.change for s in choice.separations))
@@ -179,6 +197,7 @@ def screening(result: StudyResult) -> Section:
         "margins, 95 %."
     )
     blocks += [Figure("half-normal", half_normal(part), caption), effect_table(part)]
+    blocks += [further_effects(part)] if part.further_analyses else []
     notes = (*analysis.notes, _no_pile_note(part))
     blocks.append(Bullets(notes))
     blocks += not_testable(part)
@@ -233,6 +252,19 @@ def effect_table(part: ScreeningResult) -> Table:
         "pours in the target's own observable."
     )
     return Table(header, tuple(rows), caption)
+
+
+def further_effects(part: ScreeningResult) -> Table:
+    """Effects on the targets beside the first, with their corrected p."""
+    rows = []
+    for name, analysis in part.further_analyses.items():
+        for effect in analysis.factor_effects():
+            test = analysis.deciding_test(effect)
+            half = f"± {fixed(analysis.half_width(effect))}"
+            p = MISSING if test is None else p_value(test.p_holm)
+            rows.append((observable_title(name), effect.name.replace("_", " "), signed(effect.effect), half, p))
+    caption = "Effects on the other targets; of a factor the largest |t| over all targets counts for going on."
+    return Table(("target", "factor", "effect", "95 %", "p Holm"), tuple(rows), caption)
 
 
 def row_table(part: ScreeningResult) -> Table:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from doe.run_records import Run
 from doe.studies.study_result import AnyStudy, PartialStudy, StudyResult
+from doe.target import experiment_of
 from explorer.background.command_process import CommandStatus
 from explorer.outcomes import outcome_text
 from explorer.photograph.target import FOLDER, PhotographedTarget, load_target
@@ -16,7 +17,7 @@ from explorer.report.identified import settings
 from explorer.report.sections.answer import banner
 from explorer.report.study_charts import Plot, Plots, study_plots
 from explorer.study.runs import stages_with_runs
-from explorer.units import MISSING, number, observable_label, observed
+from explorer.units import MISSING, enumeration, number, observable_label, observed
 from explorer.viewer.board.board import Board, BoardTable, Stage, made_charts
 from explorer.viewer.study.process_view import AT_WORK, DONE, TO_COME, time_left
 
@@ -112,13 +113,18 @@ def listed_runs(result: AnyStudy) -> list[tuple[str, Run]]:
 
 
 def _runs(result: AnyStudy) -> BoardTable:
-    observable = result.study.targets[0].observable
+    targets = [target.observable for target in result.study.targets]
+    first = {experiment_of(name): name for name in reversed(targets)}
     runs = listed_runs(result)
     rows = tuple(
-        (stage, run.label, str(run.seed), outcome_text(run.outcome), _value(run, observable)) for stage, run in runs
+        (stage, run.title, str(run.seed), outcome_text(run.outcome), _value(run, first[run.experiment]))
+        for stage, run in runs
     )
     opens = tuple({"do": "open_run", "stage": stage, "label": run.label, "seed": run.seed} for stage, run in runs)
-    caption = f"Value: {observable_label(observable)}. A click on a row pours that run in the scene."
+    read = enumeration(
+        [observable_label(name) for name in dict.fromkeys(first[experiment_of(name)] for name in targets)]
+    )
+    caption = f"Value: {read}. A click on a row pours that run in the scene."
     return BoardTable(f"Runs ({len(rows)})", Table(RUN_HEADER, rows, caption), opens)
 
 

@@ -223,11 +223,15 @@ def target_markdown(targets: Sequence[Target], photographed: PhotographedTarget 
         return f"**Target:** {escaped(photographed.line)}"
     if not targets:
         return ""
-    target = targets[0]
+    first, *others = (_target_text(target) for target in targets)
+    also = f" Also: {escaped('; '.join(others))}." if others else ""
+    return f"**Target:** {escaped(first)}. From the study's file; photographs can take its place (*Laboratory*).{also}"
+
+
+def _target_text(target: Target) -> str:
     spread = "" if target.sd is None else f" ± {observed(target.observable, target.sd)} ({target.sd_source})"
     number = "" if target.n is None else f", n = {target.n}"
-    of = f"{observable_label(target.observable)}: {observed(target.observable, target.mean)}{spread}{number}"
-    return f"**Target:** {escaped(of)}. From the study's file; photographs can take its place (*Laboratory*)."
+    return f"{observable_label(target.observable)}: {observed(target.observable, target.mean)}{spread}{number}"
 
 
 def set_live(session: Session, values: Mapping[str, float | str]) -> None:

@@ -8,7 +8,7 @@ from doe.stages import planned_runs
 from doe.store import Store, StoredRun
 from doe.studies.study import load_study, with_profile
 from explorer.study.duration import PACE, SETTLING, duration_text
-from solver import PHYSICS, body_counts, with_rig
+from solver import PHYSICS, body_counts, value, with_rig
 from solver.scenes.time_step import time_step
 
 STUDY = load_study("sunflower_extract")
@@ -55,11 +55,32 @@ def test_before_the_first_pours_it_is_reckoned_from_spheres_and_steps(store, tmp
     assert not (tmp_path / "none.sqlite").exists()
 
 
-def test_a_rig_without_a_feed_tells_no_time(tmp_path):
+def test_a_drum_takes_its_filling_and_its_turns(tmp_path):
     drum = replace(STUDY, scene=with_rig(STUDY.scene, "rotating_drum"))
+    scene = with_profile(drum, "standard")[0].scene
+    counts = body_counts(scene)
+    spheres = sum(n * len(body.clump.radii) for n, body in zip(counts, scene.bodies, strict=True))
+    mass = sum(n * body.mass for n, body in zip(counts, scene.bodies, strict=True))
+    turns = value(scene, "rig.transient_turns") + value(scene, "rig.averaging_turns")
+    simulated = mass / value(scene, "insertion.rate") + SETTLING + 60.0 * turns / value(scene, "rig.speed_rpm")
+    seconds = spheres * simulated / time_step(scene) / PACE
     said = duration_text(drum, STANDARD, tmp_path / "none.sqlite", 2)
-    assert "how long is told after the first pours" in said
-    assert " min" not in said
+    assert f"({seconds:.0f} s a pour, from spheres and steps" in said
+
+
+def test_pours_in_another_rig_say_nothing_of_the_own_one(store):
+    """Stored under the same study, with its shapes and mass: of another experiment."""
+    before = duration_text(STUDY, QUICK, store, 2)
+    kept = Store(store)
+    parameters = {"rig.name": "lifting_cylinder", "body.spheres": "coarse", "rig.mass": QUICK.mass}
+    kept.add(
+        StoredRun(
+            "other", STUDY.name, "pilot", "reference, lift", 9, PHYSICS, "at_rest", "", parameters, 1, {}, 1e-5, 1,
+            500.0, b"",
+        )
+    )  # fmt: skip
+    kept.close()
+    assert duration_text(STUDY, QUICK, store, 2) == before
 
 
 def test_a_study_whose_pilot_sizes_it_takes_at_least_that(store):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from doe.pour_runner import TRIES
-from doe.studies.study_result import OWN_STAGES
+from doe.studies.study_result import OWN_STAGES, Stages
 from explorer.photograph.target import FOLDER, load_target, remove_target
 from explorer.report import folder
 from explorer.study import run as study_run
@@ -24,8 +24,9 @@ from tests.explorer.viewer.study_panel_at_hand import study_with_own_profiles
 class Formula(FormulaRunner):
     """Takes the arguments of a PourRunner and tells its progress in the same way."""
 
-    def __init__(self, scene, store, study, seed, threads, on_run, observer, pours, tries):
+    def __init__(self, scene, store, study, seed, threads, on_run, observer, pours, tries, experiments):
         super().__init__(planted, sigma=0.5)
+        assert not experiments
         self._on_run = on_run
         Formula.tries = tries
 
@@ -120,6 +121,26 @@ def test_a_study_that_cannot_be_analysed_ends_in_one_line(tmp_path, monkeypatch)
     assert not (tmp_path / "out" / "result.json").exists()
 
 
+def test_a_target_out_of_reach_stops_a_study_unless_it_is_told_to_go_on(tmp_path, monkeypatch):
+    class Flat(Formula):
+        def _once(self, stage, row, setting, replicate, attempt):
+            run = super()._once(stage, row, setting, replicate, attempt)
+            seen = dict.fromkeys(run.observables, 3.0 + 0.1 * (run.seed % 5))
+            return dataclasses.replace(run, observables=seen)
+
+    monkeypatch.setattr(study_run, "PourRunner", Flat)
+    stopped = calibrate(tmp_path)
+    assert stopped.exit_code == 1
+    assert stopped.stderr.startswith("error: stopped in the reach stage: out of reach: 3.")
+    assert stopped.stderr.count("\n") == 1
+    assert "--beyond-reach" in stopped.stderr
+    done = calibrate(tmp_path, "--resume", "--beyond-reach")
+    assert done.exit_code == 0, done.output
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert result["reach"] is None
+    assert result["study"]["profile"]["reach_runs"] == 0
+
+
 @pytest.mark.parametrize(
     ("options", "says"),
     [
@@ -168,8 +189,10 @@ def test_piles_of_reference_and_optimum_are_read_off_the_store(monkeypatch):
     run = reported_studies.typed(reported_studies.result_of_case("planted")).verification.runs[0]
     runs = [dataclasses.replace(run, label="reference", outcome="at_rest", key=key) for key in ("a", "b", "lost")]
     jammed = dataclasses.replace(run, label="reference", outcome="jammed", key="jammed")
-    stages = SimpleNamespace(runs_of=lambda stage: ((*runs, jammed),) if stage == "pilot" else ())
-    (pile,) = study_run.poured_piles(stages, kept)
+    elsewhere = dataclasses.replace(runs[0], experiment="drum")
+    rows = {"pilot": ((*runs, jammed, elsewhere),)}
+    monkeypatch.setattr(Stages, "runs_of", lambda self, stage: rows.get(stage, ()))
+    (pile,) = study_run.poured_piles(Stages(), kept)
     assert (pile.name, pile.pours) == ("reference", 2)
     u = np.array(pile.u)
     inside = np.abs(u) < 0.9 * radius
