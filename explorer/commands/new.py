@@ -28,12 +28,22 @@ def new(
     part: list[Path] = typer.Option(
         [], metavar="PART.toml", help="Measured parameters for the new material, from `explorer lab --out`; repeatable."
     ),
+    from_liggghts: Path | None = typer.Option(
+        None, metavar="FILE", help="A new material from a LIGGGHTS input script: property/global, particletemplate."
+    ),
+    from_yade: Path | None = typer.Option(
+        None, metavar="FILE", help="A new material from a YADE script, which is read, not run: FrictMat, sphere."
+    ),
+    from_edem: Path | None = typer.Option(
+        None, metavar="FILE", help="A new material from a table of EDEM's values, or a folder of `export --to edem`."
+    ),
 ) -> None:
     """Write a commented file that runs as it is.
 
     NAME.toml for a material, NAME_study.toml for a study (and NAME.toml beside it, where that is missing; a NAME
     that ends in _study means the same); for a project, a folder NAME with both and project.toml. Files that are there
-    are never overwritten.
+    are never overwritten. From another program's input, how numbers were converted, what was not taken and what is
+    assumed is told, and stands at the top of the file.
     """
     import shlex
 
@@ -42,9 +52,20 @@ def new(
 
     if kind == StarterKind.MATERIAL and material is not None:
         raise CommandError("--material: belongs to `new study` and `new project`")
-    if kind != StarterKind.MATERIAL and (like is not None or part):
-        raise CommandError("--like, --part: belong to `new material`")
-    if like is not None or part:
+    inputs = {"liggghts": from_liggghts, "yade": from_yade, "edem": from_edem}
+    given = {program: file for program, file in inputs.items() if file is not None}
+    if kind != StarterKind.MATERIAL and (like is not None or part or given):
+        raise CommandError("--like, --part, --from-…: belong to `new material`")
+    if len(given) > 1 or (given and (like is not None or part)):
+        raise CommandError(f"--from-{next(iter(given))}: allowed without --like, --part and another --from-…")
+    if given:
+        from explorer.imported import write_imported
+
+        path, notes = write_imported(out, name, *next(iter(given.items())))
+        written = [path]
+        for note in notes:
+            typer.echo(f"note: {note}")
+    elif like is not None or part:
         from explorer.laboratory.part import write_measured_material
 
         written = [write_measured_material(out, name, like, part)]

@@ -9,7 +9,8 @@ import trimesh
 from doe.studies.study import load_study
 from explorer.scene.file import load_scene
 from explorer.scene.starter_files import study_text
-from solver import value
+from solver import load_material, value
+from solver.assets import asset_path, shipped_assets
 from tests.explorer.command_line import TINY, explorer, refused, settings
 
 
@@ -91,7 +92,7 @@ def test_what_is_assumed_exists(tmp_path):
             entry = entry[key]
 
 
-@pytest.mark.parametrize("material", [None, "sunflower_extract"])
+@pytest.mark.parametrize("material", [None, *shipped_assets("materials")])
 def test_study_is_about_its_material(material, tmp_path):
     chosen = ["--material", material] if material else []
     assert explorer("new", "study", "own", "--out", tmp_path, *chosen).exit_code == 0
@@ -107,6 +108,16 @@ def test_study_is_about_its_material(material, tmp_path):
         assert low < reference < high
         # six printed digits
         assert value(scene, factor.path) == pytest.approx(reference, rel=1e-5)
+
+
+@pytest.mark.parametrize("material", shipped_assets("materials"))
+def test_a_material_of_one_s_own_starts_as_any_shipped_one(material, tmp_path):
+    assert explorer("new", "material", "own", "--like", material, "--out", tmp_path).exit_code == 0
+    path = tmp_path / "own.toml"
+    assert load_material(str(path)) == load_material(material)
+    # and keeps where the numbers come from
+    shipped = tomllib.loads(asset_path("materials", material).read_text(encoding="utf-8"))
+    assert tomllib.loads(path.read_text(encoding="utf-8")).get("measured") == shipped.get("measured")
 
 
 def test_template_has_no_blank_left(tmp_path):

@@ -1,0 +1,242 @@
+"""Materials from other programs' inputs: numbers of small files in their own syntax, and of our own exports."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from explorer.export.deck import assembled
+from explorer.export.liggghts import unclamped_restitution, write_liggghts
+from explorer.export.material_table import write_material_table
+from explorer.export.yade import write_yade
+from explorer.scene.file import load_scene, with_settings
+from solver import Entries, value
+from tests.explorer.command_line import explorer, refused
+
+LIGGGHTS = """\
+# two materials: beads and a plate
+atom_style granular
+units si
+variable r equal 0.0015   # radius
+variable E equal 5.0e6*2
+fix m1 all property/global youngsModulus peratomtype ${E} 1.e8
+fix m2 all property/global poissonsRatio peratomtype 0.45 0.3
+fix m3 all property/global coefficientRestitution peratomtypepair 2 &
+    0.3 0.4 &
+    0.4 0.5
+fix m4 all property/global coefficientFriction peratomtypepair 2 0.5 0.35 0.35 0.1
+fix m5 all property/global coefficientRollingFriction peratomtypepair 2 0.02 0.03 0.03 0.0
+fix m6 all property/global cohesionEnergyDensity peratomtypepair 2 0 0 0 0
+pair_style gran model hertz tangential history rolling_friction cdt
+pair_coeff * *
+fix gravi all gravity 9.81 vector 0.0 0.0 -1.0
+fix zwalls all wall/gran model hertz tangential history primitive type 2 zplane 0.0
+fix pts1 all particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant ${r}
+fix pdd1 all particledistribution/discrete 32452843 1 pts1 1.0
+"""
+
+YADE = """\
+from yade import pack
+import does_not_exist
+young, phi = 1e7, radians(30)
+beads = O.materials.append(FrictMat(young=young, poisson=.3, density=2500, frictionAngle=phi, label='beads'))
+O.materials.append(FrictMat(young=2*young, poisson=.25, frictionAngle=atan(0.4), label='plate'))
+O.materials.append(ViscElMat(kn=1e5))
+O.bodies.append(sphere((0, 0, 1), radius=2e-3, material='beads'))
+O.bodies.append(wall(0, axis=2, material='plate'))
+O.engines = [
+    Ip2_FrictMat_FrictMat_MindlinPhys(en=MatchMaker(matches=((0, 0, .6), (0, 1, .7))), krot=1.0),
+    NewtonIntegrator(damping=0, gravity=(0, 0, -9.81)),
+]
+raise SystemExit("read, not run")
+"""
+
+EDEM = """\
+Material,Poisson's Ratio,Solids Density [kg/m3],Shear Modulus [MPa],Work Function
+maize,0.4,1197,137,1
+steel,0.3,7800,70000,1
+
+Material 1,Material 2,Coefficient of Restitution,Coefficient of Static Friction,Coefficient of Rolling Friction
+maize,maize,0.182,0.431,0.0782
+maize,steel,0.621,0.342,0.0515
+"""
+
+
+def imported(program, text, tmp_path, name="input.txt"):
+    """The scene of the new material, and what was said."""
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return read_back(program, path, tmp_path)
+
+
+def read_back(program, path, tmp_path):
+    result = explorer("new", "material", "mine", f"--from-{program}", path, "--out", tmp_path)
+    assert result.exit_code == 0, result.output
+    return load_scene(str(tmp_path / "mine.toml")), result.stdout
+
+
+def numbers(scene, *paths):
+    return [float(value(scene, path)) for path in paths]
+
+
+def test_a_liggghts_script(tmp_path):
+    scene, said = imported("liggghts", LIGGGHTS, tmp_path)
+    assert scene.material("type1").youngs_modulus == pytest.approx(1e7)
+    assert scene.material("type1").density == 2500.0
+    assert numbers(scene, "material.type1.poisson_ratio", "material.type2.poisson_ratio") == [0.45, 0.3]
+    assert numbers(scene, "pair.type1.type1.static_friction", "pair.type1.type2.static_friction") == [0.5, 0.35]
+    # without limitForce the contact gives back what is typed in
+    assert numbers(scene, "pair.type1.type1.restitution", "pair.type1.type2.restitution") == [0.3, 0.4]
+    assert numbers(scene, "effect.rolling_resistance.rolling_friction") == [0.02]
+    assert scene.rig.wall == "type2"
+    assert scene.gravity == (0.0, 0.0, -9.81)
+    (body,) = scene.bodies
+    assert (body.name, body.extents[0]) == ("pts1", pytest.approx(3e-3))
+    assert "cohesionEnergyDensity: no counterpart" in said
+    assert "rolling friction: cdt there" in said
+    assert "type1 and type2 0.03" in said
+    assert scene.assumed == ()
+    assert "# rolling friction: cdt there" in (tmp_path / "mine.toml").read_text(encoding="utf-8")
+
+
+def test_a_rolling_friction_without_a_model_does_not_act_in_liggghts(tmp_path):
+    scene, said = imported("liggghts", LIGGGHTS.replace(" rolling_friction cdt", ""), tmp_path)
+    assert numbers(scene, "effect.rolling_resistance.rolling_friction") == [0.0]
+    assert "coefficientRollingFriction: no rolling_friction in pair_style" in said
+
+
+def test_a_yade_script_is_read_and_not_run(tmp_path):
+    scene, said = imported("yade", YADE, tmp_path, "script.py")
+    assert scene.material("beads").youngs_modulus == pytest.approx(1e7)
+    assert numbers(scene, "material.beads.density", "material.plate.poisson_ratio") == [2500.0, 0.25]
+    # an angle there, its tangent here; of two materials the smaller one
+    friction = numbers(scene, "pair.beads.beads.static_friction", "pair.beads.plate.static_friction")
+    assert friction == pytest.approx([1.0 / math.sqrt(3.0), 0.4])
+    assert numbers(scene, "pair.beads.beads.restitution", "pair.beads.plate.restitution") == [0.6, 0.7]
+    assert (scene.rig.wall, scene.bodies[0].extents[0]) == ("plate", pytest.approx(4e-3))
+    for words in ("tan(frictionAngle)", "ViscElMat (line 6): only FrictMat is taken", "krot: not taken"):
+        assert words in said
+
+
+def test_edem_s_table_has_the_shear_modulus(tmp_path):
+    scene, said = imported("edem", EDEM, tmp_path, "table.csv")
+    maize = scene.material("maize")
+    assert (maize.density, maize.shear_modulus) == (1197.0, 137e6)
+    assert maize.youngs_modulus == pytest.approx(2.0 * 137e6 * 1.4)
+    assert numbers(scene, "pair.maize.steel.restitution", "pair.maize.maize.static_friction") == [0.621, 0.431]
+    assert numbers(scene, "effect.rolling_resistance.rolling_friction") == [0.0782]
+    assert scene.rig.wall == "steel"
+    assert "E = 2 G (1 + nu)" in said
+    assert "constant torque" in said
+    assert "work_function: no counterpart" in said
+    # EDEM keeps shapes elsewhere
+    assert "body.maize.shape" in scene.assumed
+
+
+def test_what_a_file_does_not_say_is_assumed(tmp_path):
+    scene, _ = imported("yade", "m = FrictMat(young=1e7)\n", tmp_path, "script.py")
+    assert {"materials.m.density", "materials.m.poisson_ratio", "pair.m.m.static_friction"} <= set(scene.assumed)
+    assert "materials.m.youngs_modulus" not in scene.assumed
+
+
+DECKABLE = ["pair.seed.plate.static_friction=0.31", "pair.petiole.rigid_sieve_plate.restitution=0.44"]
+
+
+@pytest.fixture
+def declared():
+    scene = with_settings(load_scene("funnel"), DECKABLE)
+    return dataclasses.replace(
+        scene, bodies=tuple(dataclasses.replace(body, spheres="coarse") for body in scene.bodies)
+    )
+
+
+def deck_of_nothing(scene):
+    """A deck into which nothing falls: what it says of the material is the same."""
+    nothing = {
+        "step": (0,),
+        "component": (0,),
+        "time": (0,),
+        "position": (0, 3),
+        "quaternion": (0, 4),
+        "velocity": (0, 3),
+    }
+    return assembled(scene, 1, 1e-5, 1, Entries(**{key: np.zeros(shape) for key, shape in nothing.items()}), plate=0.0)
+
+
+def same(scene, again, names, rel=1e-9):
+    """Materials, pairs and, with their mass, bodies of both; ``names``: ours → theirs."""
+    for body in scene.bodies:
+        ours, theirs = scene.material(body.material), again.material(names[body.material])
+        for key in ("density", "youngs_modulus", "poisson_ratio"):
+            assert getattr(theirs, key) == pytest.approx(getattr(ours, key), rel=rel), (body.name, key)
+    for pair in scene.pairs:
+        for key in ("static_friction", "restitution"):
+            path = f"pair.{names[pair.a]}.{names[pair.b]}.{key}"
+            assert value(again, path) == pytest.approx(getattr(pair, key), rel=rel), path
+
+
+def test_a_deck_for_liggghts_comes_back(declared, tmp_path):
+    scene = with_settings(declared, ["effect.rolling_resistance.rolling_friction=0.07"])
+    write_liggghts(tmp_path, deck_of_nothing(scene))
+    again, said = read_back("liggghts", tmp_path / "in.liggghts", tmp_path)
+    kinds = ["seed", "plate", "petiole", "rigid_sieve_plate"]
+    same(scene, again, {name: f"type{k}" for k, name in enumerate(kinds, start=1)})
+    assert numbers(again, "effect.rolling_resistance.rolling_friction") == [0.07]
+    assert "limitForce" in said  # 0.57 is typed in there as another number
+    assert f"{unclamped_restitution(0.57):.3f}" in (tmp_path / "in.liggghts").read_text(encoding="utf-8")
+    for ours, theirs in zip(scene.bodies, again.bodies, strict=True):
+        assert theirs.mass == pytest.approx(ours.mass, rel=1e-9)
+        assert np.allclose(theirs.clump.centres, ours.clump.centres, atol=1e-9)
+
+
+def test_a_deck_for_yade_comes_back(declared, tmp_path):
+    write_yade(tmp_path, deck_of_nothing(declared))
+    again, _ = read_back("yade", tmp_path / "yade_pour.py", tmp_path)
+    same(declared, again, {**{body.name: body.name for body in declared.bodies}, "rigid_sieve_plate": "wall"})
+    assert [body.name for body in again.bodies] == [body.name for body in declared.bodies]
+
+
+def test_tables_for_edem_come_back(declared, tmp_path):
+    scene = with_settings(declared, ["effect.rolling_resistance.rolling_friction=0.07"])
+    folder = tmp_path / "tables"
+    folder.mkdir()
+    write_material_table(folder, scene)
+    again, said = read_back("edem", folder, tmp_path)
+    same(scene, again, {name: name for name in ("seed", "plate", "petiole", "rigid_sieve_plate")}, rel=1e-6)
+    assert again.rig.wall == "rigid_sieve_plate"
+    fractions = {body.name: body.mass_fraction for body in again.bodies}
+    assert fractions == pytest.approx({body.name: body.mass_fraction for body in scene.bodies})
+    assert numbers(again, "effect.rolling_resistance.rolling_friction") == [0.07]
+    assert "bodies.csv: mass, moments" in said
+
+
+@pytest.mark.parametrize(
+    ("program", "text", "words"),
+    [
+        ("liggghts", "units micro\n", "units micro; allowed: si"),
+        ("liggghts", "run 10\n", "says no material"),
+        ("liggghts", "fix a all property/global youngsModulus peratomtype v_E\n", "'v_E' is not a number"),
+        ("liggghts", "fix a all property/global coefficientFriction peratomtypepair 2 1 2 3\n", "allowed: 4"),
+        ("yade", "FrictMat(young=open('x').read())\n", "line 1: FrictMat(young=open('x').read()): not known"),
+        ("yade", "a = = 1\n", "line 1: is not Python"),
+        ("yade", "FrictMat(young=1e7, poisson=0.9)\n", "poisson_ratio"),
+        ("edem", "maize, 1, 2\n", "says no material"),
+        ("edem", "Material,Shear Modulus [Pa]\nmaize,stiff\n", "maize: shear_modulus: 'stiffPa'"),
+        ("edem", "Material,Shear Modulus [psi]\nmaize,3\n", "psi"),
+    ],
+)
+def test_a_bad_input_is_one_line(program, text, words, tmp_path):
+    path = tmp_path / "input.txt"
+    path.write_text(text, encoding="utf-8")
+    line = refused(explorer("new", "material", "mine", f"--from-{program}", path, "--out", tmp_path))
+    assert line.startswith(str(path))
+    assert words in line
+    assert not (tmp_path / "mine.toml").exists()
+
+
+def test_one_input_at_a_time_and_for_a_material(tmp_path):
+    path = tmp_path / "input.txt"
+    assert "No such file" in refused(explorer("new", "material", "mine", "--from-yade", path, "--out", tmp_path))
+    assert "--from-liggghts" in refused(explorer("new", "material", "mine", "--from-liggghts", path, "--like", "maize"))
+    assert "belong to `new material`" in refused(explorer("new", "study", "mine", "--from-edem", path))
