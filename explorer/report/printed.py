@@ -312,7 +312,9 @@ def _draw(axes: Axes, trace: Json, spec: Spec, sides: tuple[Json, Json], number:
         case "contour":
             _contour(axes, trace, spec, order)
         case "heatmap":
-            scale = spec["layout"]["coloraxis"]
+            # A scale of its own runs over its own values.
+            own = {"colorscale": trace.get("colorscale"), "cmin": 0.0, "cmax": float(np.max(trace["z"]))}
+            scale = own if own["colorscale"] else spec["layout"]["coloraxis"]
             axes.pcolormesh(
                 trace["x"], trace["y"], np.array(trace["z"], dtype=float), cmap=_colour_map(scale),
                 vmin=scale["cmin"], vmax=scale["cmax"], shading="nearest", rasterized=True, zorder=order - 1.5,
@@ -338,7 +340,7 @@ def _scatter(axes: Axes, trace: Json, sides: tuple[Json, Json], order: float, on
     x, y = (_values(axes, trace[k], k, side) for k, side in zip("xy", sides, strict=True))
     marker, stroke = trace.get("marker", {}), trace.get("line", {})
     opacity = trace.get("opacity", 1.0)
-    if "fill" in trace:
+    if "fill" in trace or trace.get("contours", {}).get("type") == "constraint":
         axes.fill(x, y, color=_rgba(trace["fillcolor"]), linewidth=0.0, zorder=order - 1.0)
         return
     colour = marker.get("color", stroke.get("color", "#656ee0"))
@@ -410,9 +412,20 @@ def _contour(axes: Axes, trace: Json, spec: Spec, order: float) -> None:
     x, y, z = (np.array(trace[key], dtype=float) for key in "xyz")
     how, stroke = trace["contours"], trace.get("line", {})
     width = max(0.4, stroke.get("width", 1.0) * PX)
+    if how.get("type") == "constraint":
+        # As plotly does, where z > value, all that our charts ask for, does not hold.
+        if np.nanmin(z) < how["value"]:
+            levels = [float(np.nanmin(z)) - 1.0, how["value"]]
+            axes.contourf(x, y, z, levels, colors=[_rgba(trace["fillcolor"])], zorder=0.3)
+        return
     if how["coloring"] == "none" and "start" in how:
-        if np.nanmin(z) <= how["start"] <= np.nanmax(z):
-            axes.contour(x, y, z, [how["start"]], colors=[_rgba(stroke["color"])], linewidths=width, zorder=order)
+        step = how.get("size", 1.0)
+        levels = np.arange(how["start"], how.get("end", how["start"]) + 0.5 * step, step).tolist()
+        if found := [level for level in levels if np.nanmin(z) <= level <= np.nanmax(z)]:
+            dash = {"dot": "dotted", "dash": "dashed"}.get(stroke.get("dash", ""), "solid")
+            axes.contour(
+                x, y, z, found, colors=[_rgba(stroke["color"])], linewidths=width, linestyles=dash, zorder=order
+            )
         axes.set_xlim(x.min(), x.max())
         axes.set_ylim(y.min(), y.max())
         return
@@ -515,7 +528,7 @@ def _legend(figure: Figure, spec: Spec, width: float) -> None:
         name = plain(str(trace.get("name", "")))
         if not name or not trace.get("showlegend", True) or name in shown or trace["type"] == "heatmap":
             continue
-        if trace["type"] == "contour" and trace["contours"]["coloring"] != "none":
+        if trace["type"] == "contour" and trace["contours"].get("coloring", "none") != "none":
             continue
         shown[name] = _key(trace)
     if len(shown) < 2:
@@ -534,7 +547,7 @@ def _key(trace: Json) -> Any:
     if trace["type"] == "bar":
         colour = marker["color"]
         return Patch(color=colour[0] if isinstance(colour, list) else colour)
-    if "fill" in trace:
+    if "fill" in trace or trace.get("contours", {}).get("type") == "constraint":
         return Patch(color=_rgba(trace["fillcolor"]))
     key = Line2D([], [], linestyle="none")
     mode = "lines" if trace["type"] == "contour" else trace.get("mode", "lines")

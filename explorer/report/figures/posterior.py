@@ -58,7 +58,8 @@ def overlaid(targets: Sequence[FittedTarget]) -> Spec:
         missed = [_missed(one, i, j) for one in targets]
         flat: Json = {"type": "contour", "x": x, "y": y, "showscale": False, "hoverinfo": "skip", **axes}
         worst = np.abs(missed).max(axis=0).round(4).tolist()
-        inside = {"type": "constraint", "operation": "<", "value": 1.0}
+        # plotly shades where a constraint does not hold.
+        inside = {"type": "constraint", "operation": ">", "value": 1.0}
         traces.append(
             flat
             | {"z": worst, "contours": inside, "fillcolor": WITHIN, "line": {"width": 0}}
@@ -107,7 +108,7 @@ def corner(posterior: JointPosterior, factors: Sequence[Factor]) -> Spec:
             x, y = f"x{suffix(panel)}", f"y{suffix(panel)}"
             title = axis_title(factors[column].path, factors[column].name) if row == k - 1 else ""
             layout[f"xaxis{suffix(panel)}"] = axis(title, domain=domains[column], anchor=y, showticklabels=row == k - 1)
-            beside = axis_title(factors[row].path, factors[row].name) if column == 0 and row else ""
+            beside = factors[row].name if column == 0 and row else ""  # a panel is too low for more
             layout[f"yaxis{suffix(panel)}"] = axis(
                 beside, domain=domains[k - 1 - row], anchor=x, showticklabels=column == 0 and row > 0
             )

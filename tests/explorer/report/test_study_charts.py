@@ -27,8 +27,8 @@ from tests.explorer.reported_studies import BIAS, PROFILE, STUDY, planted, typed
 TITLES = (
     "Noise of the estimators", "Pareto of effects, by replicates", "Pareto of effects, by dummies", "Half-normal",
     "Main effects", "Effects with intervals", "Scan of an assumption", "Ascent path", "Contours",
-    "Predicted and observed", "Residual quantiles", "Solution surface", "Optimum and its refits",
-    "Ranges of the optimum", "Verification",
+    "Predicted and observed", "Residual quantiles", "Solution surface", "Posterior of the factors",
+    "Optimum and its refits", "Ranges of the optimum", "Verification",
 )  # fmt: skip
 
 
