@@ -341,6 +341,7 @@ def sized_pictures(view: Camera, ending: str) -> None:
     view.take(f"calibrate_finished{ending}", 4.0)
     view.open("Laboratory")
     view.unfold("Photograph → angle of repose")
+    view.press("Read the angle")
     view.top("explorer measure")
     view.take(f"laboratory_photograph{ending}")
     view.open("Reports")
