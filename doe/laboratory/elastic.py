@@ -22,7 +22,7 @@ from doe.laboratory.caveats import NEEDS_RADIUS, caveats
 from doe.laboratory.hertz import HERTZ, S368, CurvedBody, HertzRange, hertz_range
 from doe.laboratory.linear_range import FEWEST_POINTS, LinearRange, linear_range
 from doe.laboratory.result import CurveFit, Derived, Estimate, derived
-from doe.laboratory.tables import LaboratoryError, Reading, Table
+from doe.laboratory.tables import LaboratoryError, Reading, Table, by_replicate
 
 MODULI = {"compression": ("youngs_modulus", "E = (F/A)/(ΔL/T)"), "shear": ("shear_modulus", "G = (F/A)/(ΔL/T)")}
 """Name and formula of what a test measures."""
@@ -39,12 +39,10 @@ def moduli(table: Table, test: str) -> tuple[tuple[Derived, ...], tuple[CurveFit
     name, formula = MODULI[test]
     found, curves = [], []
     for of, rows in table.groups().items():
-        by_replicate: dict[str, list[Reading]] = {}
-        for row in rows:
-            by_replicate.setdefault(row.replicate, []).append(row)
+        samples = by_replicate(rows)
         own: list[CurveFit] = []
         values, by_standard = [], []
-        for points in by_replicate.values():
+        for points in samples.values():
             _check(table, points, rows[0])
             body = _curved_body(points[0])
             fit: LinearRange | HertzRange | None
@@ -57,7 +55,7 @@ def moduli(table: Table, test: str) -> tuple[tuple[Derived, ...], tuple[CurveFit
             if fit:
                 x, f = _columns(points)
                 own.append(CurveFit(name, of, points[0].replicate, x, f, fit, value))
-        names, notes = list(by_replicate), caveats(test, of[0], list(by_replicate), own)
+        names, notes = list(samples), caveats(test, of[0], list(samples), own)
         parameter, used = f"materials.{of[0]}.{name}", BY_HERTZ if by_standard else formula
         found.append(derived(table, name, "Pa", of, used, names, values, parameter, notes))
         if by_standard:

@@ -31,7 +31,7 @@ from scipy import stats
 
 from doe.laboratory.reading_error import propagated
 from doe.laboratory.result import Derived, derived
-from doe.laboratory.tables import COMPONENT, LENGTH, MASS, Column, Layout, Reading, Table
+from doe.laboratory.tables import COMPONENT, LENGTH, MASS, Column, Layout, Reading, Table, by_replicate
 
 Array = npt.NDArray[np.float64]
 Value = Callable[[Sequence[Reading]], float]
@@ -87,9 +87,7 @@ def sieve(table: Table) -> tuple[tuple[Derived, ...], tuple[str, ...]]:
     found: list[Derived] = []
     notes = [INTERPOLATED, BY_NUMBER]
     for of, rows in table.groups().items():
-        samples: dict[str, list[Reading]] = {}
-        for row in rows:
-            samples.setdefault(row.replicate, []).append(row)
+        samples = by_replicate(rows)
         for name, sample in samples.items():
             _check(table, sample)
             lost = loss(sample)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -150,6 +150,14 @@ class Table:
     def wrong(self, row: Reading, column: str, text: str) -> LaboratoryError:
         """An error about one cell."""
         return LaboratoryError(f"{self.file}, row {row.line}, column {column}: {text}")
+
+
+def by_replicate(rows: Iterable[Reading]) -> dict[str, list[Reading]]:
+    """The rows of each replicate, in their order."""
+    found: dict[str, list[Reading]] = {}
+    for row in rows:
+        found.setdefault(row.replicate, []).append(row)
+    return found
 
 
 def read_table(path: Path, layout: Layout) -> Table:

@@ -193,6 +193,10 @@ class Study:
         """Names of all experiments, "" for the study's own rig first."""
         return ("", *self.experiments)
 
+    def scene_of(self, experiment: str) -> Scene:
+        """The scene of an experiment by its name, "" for the study's own rig."""
+        return self.experiments[experiment] if experiment else self.scene
+
 
 class LevelsTable(TomlTable):
     """A ``[[factor]]`` or ``[[assumption]]``."""

@@ -85,7 +85,7 @@ def reckoned_time(study: Study, profile: Profile, experiment: str = "") -> float
         sized = with_profile(study, profile.name)[0]
     except ValueError:  # a profile that this study cannot have, which is told where it is started
         return math.nan
-    scene = sized.experiments[experiment] if experiment else sized.scene
+    scene = sized.scene_of(experiment)
     if "insertion.rate" not in parameters(scene):
         return math.nan
     counts = body_counts(scene)
@@ -102,7 +102,7 @@ def stored_times(study: Study, profile: Profile, store: Path, experiment: str = 
     """Wall times [s] of the stored pours of ``study`` with the shapes of ``profile``, in the rig and with the mass."""
     if not store.is_file():
         return []
-    scene = study.experiments[experiment] if experiment else study.scene
+    scene = study.scene_of(experiment)
     mass = float(value(scene, "rig.mass")) if experiment and "rig.mass" in parameters(scene) else profile.mass
     wanted: dict[str, float | str] = {RIG: scene.rig.name, "body.spheres": profile.spheres, "rig.mass": mass}
     try:

@@ -39,6 +39,5 @@ def scene_of(result: AnyStudy, stage: str, run: Run) -> tuple[Scene, bool]:
     profile = result.study.profile
     study = replace(load_study(result.study.file), profiles={profile.name: profile})
     study, _ = with_profile(study, profile.name)
-    scene = study.experiments[run.experiment] if run.experiment else study.scene
-    scene = with_values(scene, settings_of(result, stage, run.label))
+    scene = with_values(study.scene_of(run.experiment), settings_of(result, stage, run.label))
     return scene, pour_key(scene, run.seed) == run.key

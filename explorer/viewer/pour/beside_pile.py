@@ -72,6 +72,11 @@ class BesidePile:
         self._aside: dict[int, Aside] = {}
         server.scene.add_frame(ROOT, show_axes=False, position=(BESIDE, 0.0, 0.0))
 
+    def pour_present(self) -> None:
+        """Begin the second pour with the scene and the seed of the first as they are now."""
+        status = self._first.status()
+        self.pour(status.scene, status.seed)
+
     def pour(self, scene: Scene, seed: int, names: tuple[str, str] = ("first pour", "second pour")) -> None:
         """Begin the second pour, in place of one before it; ``names`` stand above both, with what they have come to."""
         self._take_signs_away()

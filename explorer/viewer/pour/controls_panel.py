@@ -56,7 +56,7 @@ class Controls:
         button_group(
             gui,
             "Second pile",
-            {POUR_SECOND: self._keep, "Take away": page.beside.close},
+            {POUR_SECOND: page.beside.pour_present, "Take away": page.beside.close},
             post,
             hint=SECOND_HINT,
         )
@@ -91,10 +91,6 @@ class Controls:
                 )
                 for label, paths in quantities(scene).items()
             ]
-
-    def _keep(self) -> None:
-        status = self._session.status()
-        self._page.beside.pour(status.scene, status.seed)
 
     def _pour(self, step: int) -> None:
         status = self._session.status()

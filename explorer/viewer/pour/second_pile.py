@@ -29,19 +29,15 @@ class SecondPile(Panel):
 
     def __init__(self, page: PageContext) -> None:
         gui = page.server.gui
-        self._first, self._beside = page.session, page.beside
+        self._beside = page.beside
         button_group(
             gui,
             "Second pile",
-            {POUR_SECOND: self._pour, "Take away": self._beside.close},
+            {POUR_SECOND: self._beside.pour_present, "Take away": self._beside.close},
             page.post,
             hint=SECOND_HINT,
         )
         self._text = gui.add_markdown(NONE)
-
-    def _pour(self) -> None:
-        status = self._first.status()
-        self._beside.pour(status.scene, status.seed)
 
     def close(self) -> None:
         """End the second pour and take it off the page."""

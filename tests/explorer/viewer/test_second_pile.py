@@ -91,7 +91,7 @@ def nodes(server):
 
 def test_it_is_poured_with_the_first_one_s_scene_and_seed_and_drawn_beside_it(bench):
     assert bench.panel._text.content == NONE
-    bench.panel._pour()
+    bench.panel._beside.pour_present()
     assert bench.second.told == [("start", SCENE, 4)]
     bench.second.newest = frame(1)
     bench.panel.draw(Now(bench.first.now))
@@ -102,7 +102,7 @@ def test_it_is_poured_with_the_first_one_s_scene_and_seed_and_drawn_beside_it(be
 
 
 def test_it_stays_as_it_was_while_the_first_is_changed_and_the_difference_is_told(bench):
-    bench.panel._pour()
+    bench.panel._beside.pour_present()
     rougher = with_values(SCENE, {"pair.seed.seed.static_friction": 0.9})
     bench.first.now = replace(bench.first.now, scene=rougher)
     bench.panel.show(Now(bench.first.now))
@@ -111,7 +111,7 @@ def test_it_stays_as_it_was_while_the_first_is_changed_and_the_difference_is_tol
 
 
 def test_it_pauses_plays_and_keeps_speed_with_the_first(bench):
-    bench.panel._pour()
+    bench.panel._beside.pour_present()
     bench.second.told.clear()
     bench.first.now = replace(bench.first.now, state=SessionState.PAUSED, speed=0.5)
     bench.panel.show(Now(bench.first.now))
@@ -125,7 +125,7 @@ def test_it_pauses_plays_and_keeps_speed_with_the_first(bench):
 
 
 def test_where_the_first_stands_still_the_second_comes_to_its_moment(bench):
-    bench.panel._pour()
+    bench.panel._beside.pour_present()
     bench.second.told.clear()
     first = replace(bench.first.now, state=SessionState.PAUSED, time=0.5)
     for time, state, asked in (
@@ -146,7 +146,7 @@ def test_where_the_first_stands_still_the_second_comes_to_its_moment(bench):
 
 
 def test_taken_away_it_leaves_nothing(bench):
-    bench.panel._pour()
+    bench.panel._beside.pour_present()
     bench.second.newest = frame(1)
     bench.panel.draw(Now(bench.first.now))
     bench.panel.close()
@@ -189,7 +189,7 @@ def test_a_measured_pile_stands_on_the_other_side_with_names_above_all_three(ben
 
 
 def test_each_name_says_what_its_pour_has_come_to(bench):
-    bench.panel._pour()
+    bench.panel._beside.pour_present()
     rest = {"angle_of_repose_deg": Value(24.0, "deg", 3.0)}
     ended = replace(bench.first.now, state=SessionState.ENDED, outcome=Outcome.AT_REST, observables=rest)
     bench.second.now = replace(bench.second.now, time=0.52)
@@ -251,7 +251,7 @@ def test_every_camera_looks_at_the_middle_from_where_all_plates_are_in_the_pictu
 def test_a_picture_of_another_shape_holds_all_plates_again_unless_a_person_moved_the_camera(bench, monkeypatch):
     client = SimpleNamespace(camera=Camera(), atomic=nullcontext)
     monkeypatch.setattr(bench.server, "get_clients", lambda: {3: client})
-    bench.panel._pour()
+    bench.panel._beside.pour_present()
     narrow = np.linalg.norm(client.camera.position - client.camera.look_at)
     client.camera.image_width *= 2  # a panel was folded away
     bench.panel.draw(Now(bench.first.now))
@@ -268,7 +268,7 @@ def test_a_plate_does_not_grow_over_the_one_beside_it(bench):
     """A body has rolled 0.9 m away: alone its plate follows it, beside another one it does not."""
     beside = bench.panel._beside
     assert beside.widest_plate == float("inf")
-    bench.panel._pour()
+    bench.panel._beside.pour_present()
     assert beside.widest_plate == PLATE_RADIUS
     far = replace(frame(1), position=np.float32([[0.9, 0.0, 0.0]]))
     bench.second.newest = far
