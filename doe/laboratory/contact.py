@@ -89,23 +89,21 @@ ROLLING = Layout(
     PAIR,
     (
         angle("angle", "slope of the plane from which on the sphere rolls by itself", "1.2", needed=False, blank=True),
-        Column(
+        positive(
             "release_height",
             LENGTH,
-            low=0.0,
+            "in place of the angle: h, release on a ramp above the level run-out, of the same point of the sphere",
+            "mm",
             needed=False,
             blank=True,
-            says="in place of the angle: h, release on a ramp above the level run-out, of the same point of the sphere",
-            unit="mm",
         ),
-        Column(
+        positive(
             "stopping_distance",
             LENGTH,
-            low=0.0,
+            "with it: L, horizontal distance from the release to where it stays at rest, the ramp included",
+            "mm",
             needed=False,
             blank=True,
-            says="with it: L, horizontal distance from the release to where it stays at rest, the ramp included",
-            unit="mm",
         ),
     ),
     gives="rolling friction of a sphere on a plane, μ_r = tan α, or h/L by the stopping distance",

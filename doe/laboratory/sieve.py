@@ -31,7 +31,7 @@ from scipy import stats
 
 from doe.laboratory.reading_error import propagated
 from doe.laboratory.result import Derived, derived
-from doe.laboratory.tables import COMPONENT, LENGTH, MASS, Column, Layout, Reading, Table, by_replicate
+from doe.laboratory.tables import COMPONENT, LENGTH, MASS, Column, Layout, Reading, Table, by_replicate, positive
 
 Array = npt.NDArray[np.float64]
 Value = Callable[[Sequence[Reading]], float]
@@ -64,15 +64,14 @@ SIEVE = Layout(
         Column(
             "mass_retained", MASS, low=0.0, zero=True, says="mass that stays on it, 0 if none", unit="g", example="12.4"
         ),
-        Column(
+        positive(
             "mass_total",
             MASS,
-            low=0.0,
+            "sample before sieving, in one or all rows of the replicate: for the loss",
+            "g",
+            "250.3",
             needed=False,
             blank=True,
-            says="sample before sieving, in one or all rows of the replicate: for the loss",
-            unit="g",
-            example="250.3",
         ),
     ),
     curves=True,

@@ -315,15 +315,8 @@ DIMENSIONS = Layout(
     (
         positive("length", LENGTH, "longest dimension of the piece", "mm", "29.42"),
         positive("width", LENGTH, "across it", "mm", "12.67"),
-        Column(
-            "thickness",
-            LENGTH,
-            low=0.0,
-            needed=False,
-            blank=True,
-            says="across both; empty for a component without",
-            unit="mm",
-            example="6.69",
+        positive(
+            "thickness", LENGTH, "across both; empty for a component without", "mm", "6.69", needed=False, blank=True
         ),
     ),
     gives="dimensions, geometric mean diameter (LWT)^(1/3), sphericity, spread of sizes; one replicate is one piece",

@@ -34,7 +34,7 @@ def read_yade(file: Path) -> Found:
     calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
     labels = _labels(tree)
     for call in sorted(calls, key=lambda node: (node.lineno, node.col_offset)):
-        kind, words = called(call.func), {word.arg: word.value for word in call.keywords if word.arg}
+        kind, words = called(call.func), _words(call)
         if kind == "FrictMat":
             _frict_mat(file, found, angles, call, words, names, labels)
         elif kind.endswith("Mat") and kind[:1].isupper():
@@ -42,7 +42,7 @@ def read_yade(file: Path) -> Found:
     if not found.materials:
         return found
     for call in calls:
-        kind, words = called(call.func), {word.arg: word.value for word in call.keywords if word.arg}
+        kind, words = called(call.func), _words(call)
         if kind == "sphere" or kind in ("wall", "facet", "box"):
             _placed(found, kind, call, words, names)
         elif kind == "NewtonIntegrator" and isinstance(words.get("gravity"), ast.Tuple | ast.List):
@@ -56,6 +56,11 @@ def read_yade(file: Path) -> Found:
             _functor(found, call, names)
     found.notes.append("not taken: bodies' places, geometry, engines and time step of the script")
     return found
+
+
+def _words(call: ast.Call) -> dict[str, ast.expr]:
+    """Keyword arguments of a call, by name."""
+    return {word.arg: word.value for word in call.keywords if word.arg}
 
 
 def _constants(tree: ast.Module) -> dict[str, float]:

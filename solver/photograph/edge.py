@@ -69,6 +69,12 @@ class Patch:
     along: tuple[float, float]
     """Unit vector of the columns in the resampled picture (y down)."""
 
+    def place(self, u: Array, z: Array) -> tuple[Array, Array]:
+        """x, y in the resampled picture of places ``u`` along the base line and ``z`` above it [px of the patch]."""
+        x = self.foot[0] + self.step * (self.along[0] * u + self.along[1] * z)
+        y = self.foot[1] + self.step * (self.along[1] * u - self.along[0] * z)
+        return x, y
+
 
 @dataclass(frozen=True, eq=False)
 class Silhouettes:
@@ -200,8 +206,7 @@ def goes_on_below(grey: Array, patch: Patch, flanks: tuple[FlankLine, FlankLine]
             off = np.concatenate([-np.linspace(width / 3.0, width, 6), np.linspace(width / 3.0, width, 6)])
             column = foot + outward * (depth[:, None] / flank.slope + np.sin(slant) * off)
             z = np.cos(slant) * off - depth[:, None]
-            x = patch.foot[0] + patch.step * (patch.along[0] * column + patch.along[1] * z)
-            y = patch.foot[1] + patch.step * (patch.along[1] * column - patch.along[0] * z)
+            x, y = patch.place(column, z)
             if x.min() < 0 or y.min() < 0 or x.max() > grey.shape[1] - 1 or y.max() > grey.shape[0] - 1:
                 return reach
             seen = ndimage.map_coordinates(grey, [y, x], order=1)

@@ -159,8 +159,7 @@ def _measured(
     checks.check_levels(angles.level_shift_deg)
     checks.check_bend([angles.left.thirds_deg, angles.right.thirds_deg], angles.bend_deg)
     middle = 0.5 * (feet[0] + feet[1])
-    place = np.array(patch.foot) + np.array(patch.along) * middle * patch.step
-    origin = picture.place(place)
+    origin = picture.place(np.array(patch.place(np.asarray(middle), np.zeros(()))))
     pixel = side * unit_pixel
     ends = picture.place(line.at(np.array([0.0, picture.grey.shape[1] - 1.0])))
     return PhotographedPile(
@@ -203,8 +202,7 @@ def _on(under: Support, patch: Patch) -> BaseLine:
     """The top of what is ``under`` the pile, as its base line."""
     ends = np.array([under.left, under.right])
     z = under.height + under.slope * ends
-    x = patch.foot[0] + patch.step * (patch.along[0] * ends + patch.along[1] * z)
-    y = patch.foot[1] + patch.step * (patch.along[1] * ends - patch.along[0] * z)
+    x, y = patch.place(ends, z)
     slope = float((y[1] - y[0]) / (x[1] - x[0]))
     return BaseLine(
         float(y[0] - slope * x[0]),
@@ -243,8 +241,7 @@ def _directions(
     """Angle [°] of the line through columns and heights of the patch against the base line, without a bend of ``k``."""
     u = np.concatenate([column, feet])
     v = np.concatenate([z, [0.0, 0.0]])
-    x = patch.foot[0] + patch.step * (patch.along[0] * u + patch.along[1] * v)
-    y = patch.foot[1] + patch.step * (patch.along[1] * u - patch.along[0] * v)
+    x, y = patch.place(u, v)
     a, b, _ = lens.centred(x, y, shape)
     a, b = lens.straight(a, b, k)
     flank = np.polyfit(a[:-2], b[:-2], 1)[0]

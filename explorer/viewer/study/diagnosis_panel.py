@@ -188,11 +188,9 @@ class DiagnosisPanel(Panel):
 
     def _place_piles(self, piles: AnswerPiles) -> None:
         fold_beside_narrow(self._page)
-        names = [
-            f"{model} model{poured_sign(*poured)}"
-            for model, poured in zip(("calibrated", "corrected"), piles.poured, strict=True)
-        ]
-        self._page.beside.pour(piles.after, self._pour(piles.before), (names[0], names[1]))
+        before, after = piles.poured
+        names = poured_sign("calibrated model", *before), poured_sign("corrected model", *after)
+        self._page.beside.pour(piles.after, self._pour(piles.before), names)
         self._page.beside.show_measured(piles.measured, measured_sign(piles), piles.before)
 
     def _pour_corrected(self) -> None:
@@ -273,17 +271,19 @@ def fold_beside_narrow(page: PageContext) -> None:
 def measured_sign(piles: AnswerPiles) -> str:
     """What stands above the measured pile: its condition and its angle, mean ± standard deviation over pours."""
     shown = "measured, mean profile" if piles.measured and piles.measured.of_revolution else "measured"
-    mean, sd = piles.angle
+    return f"{shown} ({piles.condition.name}){angle_line(*piles.angle)}"
+
+
+def poured_sign(model: str, mean: float, sd: float, pours: int) -> str:
+    """What stands above a model's pile: what all its fresh pours gave, as one pour alone may say the opposite."""
+    angle = angle_line(mean, sd) if pours > 1 else ""
+    return f"{model}{angle} over {pours} pours" if angle else model
+
+
+def angle_line(mean: float, sd: float) -> str:
+    """A further line of a sign: mean ± standard deviation [°], as far as they are known."""
     spread = f" ± {sd:.1f}°" if math.isfinite(sd) else ""
-    angle = f"\n{mean:.1f}°{spread}" if math.isfinite(mean) else ""
-    return f"{shown} ({piles.condition.name}){angle}"
-
-
-def poured_sign(mean: float, sd: float, pours: int) -> str:
-    """The line above a model's pile on what all its fresh pours gave: one pour alone may say the opposite."""
-    if not math.isfinite(mean):
-        return ""
-    return f"\n{mean:.1f}° ± {sd:.1f}° over {pours} pours" if pours > 1 else ""
+    return f"\n{mean:.1f}°{spread}" if math.isfinite(mean) else ""
 
 
 class CandidateEffects:
