@@ -41,7 +41,7 @@ MAKE = f"make -o .venv/.ready BIN={BIN}"
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 BEGUN = {
     "make serve": r"The page is at http://127\.0\.0\.1:\d+ \(Ctrl-C ends it\)",
-    "make calibrate": r"sunflower_extract, profile standard: 245 runs of 30 g; store ",
+    "make calibrate": r"sunflower_extract, profile standard: 251 runs of 30 g; store ",
     "make diagnose": r"trefoil_2: 1 fitted and 1 held-out conditions; store ",
     "explorer calibrate --headless --study lentil_study.toml --out results/lentil": r"lentil_study, profile standard: ",
     "explorer serve --study lentil_study.toml": r"The page is at http://127\.0\.0\.1:\d+",

@@ -160,7 +160,7 @@ def test_friction_taken_away_by_mouse_lets_a_resting_pile_flow(page):
 def test_space_pauses_and_plays_and_the_arrow_steps(page):
     page.keyboard.press("Escape")
     page.evaluate("document.activeElement?.blur()")
-    assert state(page) == "running"
+    wait_for(lambda: state(page) == "running")
     page.keyboard.press("Space")
     wait_for(lambda: state(page) == "paused")
     time.sleep(1.0)
@@ -182,20 +182,31 @@ def test_space_pauses_and_plays_and_the_arrow_steps(page):
     assert (positions(page) != still).any()
 
 
+def settled(page):
+    """The middle of the picture once it no longer changes: what was on its way before a pause has been drawn."""
+    seen = []
+
+    def twice():
+        seen.append(page.screenshot(clip=MIDDLE))
+        return len(seen) > 2 and seen[-1] == seen[-2] == seen[-3]
+
+    wait_for(twice)
+    return seen[-1]
+
+
 def test_an_arrow_on_a_slider_moves_the_slider_only(page):
     page.keyboard.press("Space")
     wait_for(lambda: state(page) == "paused")
-    time.sleep(1.0)
-    paused_at, seen = simulated_time(page), page.screenshot(clip=MIDDLE)
+    to_its_end(page, "Static friction", "Home", re.compile(r"In the solver: Static friction 0\s"))
+    seen, paused_at = settled(page), simulated_time(page)
     slider(page, "Static friction").focus()
     page.keyboard.press("ArrowRight")
     page.get_by_text(re.compile(r"In the solver: Static friction 0\.0\d")).wait_for()
     page.keyboard.press("ArrowRight", delay=500)  # held down it would turn the camera
     page.keyboard.press("Home")
     page.get_by_text(re.compile(r"In the solver: Static friction 0\s")).wait_for()
-    time.sleep(1.0)
+    assert settled(page) == seen
     assert (state(page), simulated_time(page)) == ("paused", paused_at)
-    assert page.screenshot(clip=MIDDLE) == seen
     page.evaluate("document.activeElement?.blur()")
     page.keyboard.press("Space")
     wait_for(lambda: state(page) == "running")
