@@ -3,7 +3,8 @@
 In one process all worlds wait at the end of a launch for the slowest, and while Python feeds and samples one world the
 other cores rest: two threads of :func:`solver.pours.run.run_queue` do the work of 1.5, two workers that of 2. The bits
 are the same. Of workers that need kernels which nobody has compiled yet, one compiles them and the others wait. A
-worker ends with its pipe: at :meth:`WorkerPool.close`, or when the process that made it is gone.
+worker ends with its pipe: at :meth:`WorkerPool.close`, or when the process that made it is gone. One that is killed,
+by a user or for memory, is replaced, and its pour begun again.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import multiprocessing as mp
 import os
 import signal
 import sys
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -36,6 +37,12 @@ if TYPE_CHECKING:
 MOMENTS = 3
 """Moments of decision of a pour after which its kernels are compiled."""
 GONE = "a worker process has ended before its work was done"
+LOSSES = 3
+"""Workers that may end over one pour: a fourth would, too."""
+
+
+class WorkerLost(RuntimeError):
+    """A worker process has ended before its work was done."""
 
 
 class WorkerPool:
@@ -49,27 +56,63 @@ class WorkerPool:
     def run_queue(self, queue: deque[Job], room: Sequence[Scene]) -> Iterator[tuple[Job, Record]]:
         """Run the jobs in ``queue`` and yield (job, record) as each finishes; jobs may be appended meanwhile.
 
-        ``room`` lists scenes that any job has to fit into. Raises RuntimeError with a worker's error, or if one died.
+        ``room`` lists scenes that any job has to fit into. Raises RuntimeError with a worker's error, and WorkerLost
+        where ``LOSSES`` workers ended over the same job.
         """
-        if not self._processes:
-            self._processes = [_worker() for _ in range(self.workers)]
-        for _, pipe in self._processes:
-            _send(pipe, list(room))
-        idle = [pipe for _, pipe in self._processes]
+        self._processes += [_worker() for _ in range(self.workers - len(self._processes))]
+        idle = [self._with_room(pipe, room) for _, pipe in self._processes]
         busy: dict[Connection, Job] = {}
+        losses: Counter[int] = Counter()
+
+        def replaced(pipe: Connection, job: Job) -> Connection:
+            losses[id(job)] += 1
+            if losses[id(job)] == LOSSES:
+                raise WorkerLost(
+                    f"{LOSSES} worker processes have ended over the same pour, seed {job.seed} of {job.scene.title!r}: "
+                    "killed from outside, or out of memory"
+                )
+            queue.appendleft(job)
+            return self._with_room(self._another(pipe), room)
+
         try:
             while queue or busy:
                 while queue and idle:
-                    pipe = idle.pop(0)
-                    busy[pipe] = queue.popleft()
-                    _send(pipe, busy[pipe])
+                    pipe, job = idle.pop(0), queue.popleft()
+                    if _sent(pipe, job):
+                        busy[pipe] = job
+                    else:
+                        idle.append(replaced(pipe, job))
                 for pipe in [ready for ready in wait(list(busy)) if isinstance(ready, Connection)]:
-                    record = _answer(pipe)
+                    job = busy.pop(pipe)
+                    try:
+                        record = _answer(pipe)
+                    except WorkerLost:
+                        idle.append(replaced(pipe, job))
+                        continue
                     idle.append(pipe)
-                    yield busy.pop(pipe), record
+                    yield job, record
         finally:
             if busy:  # left before the end: what still runs is of no use
                 self.close(at_once=True)
+
+    def _with_room(self, pipe: Connection, room: Sequence[Scene]) -> Connection:
+        """``pipe``, or that of another worker where its own has ended, told of the scenes that it has to have room for.
+
+        Raises WorkerLost where the other one has ended, too.
+        """
+        if _sent(pipe, list(room)):
+            return pipe
+        another = self._another(pipe)
+        _send(another, list(room))
+        return another
+
+    def _another(self, lost: Connection) -> Connection:
+        """Start a worker in the place of one that has ended."""
+        place = [pipe for _, pipe in self._processes].index(lost)
+        self._processes[place][0].join()
+        lost.close()
+        self._processes[place] = _worker()
+        return self._processes[place][1]
 
     def close(self, at_once: bool = False) -> None:
         """End the workers; ``at_once`` also those that are in the middle of a pour."""
@@ -143,18 +186,25 @@ def _worker() -> tuple[BaseProcess, Connection]:
     return process, ours
 
 
-def _send(pipe: Connection, order: Any) -> None:
+def _sent(pipe: Connection, order: Any) -> bool:
+    """Send ``order``; False if the worker has ended."""
     try:
         pipe.send(order)
     except OSError:
-        raise RuntimeError(GONE) from None
+        return False
+    return True
+
+
+def _send(pipe: Connection, order: Any) -> None:
+    if not _sent(pipe, order):
+        raise WorkerLost(GONE)
 
 
 def _answer(pipe: Connection) -> Any:
     try:
         answer = pipe.recv()
     except (EOFError, OSError):
-        raise RuntimeError(GONE) from None
+        raise WorkerLost(GONE) from None
     if isinstance(answer, BaseException):
         raise RuntimeError(f"a pour broke off: {answer!r}") from answer
     return answer

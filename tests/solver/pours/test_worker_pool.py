@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from solver import load_material, with_values
+from solver.pours import worker_pool
 from solver.pours.run import Job, run_pours
-from solver.pours.worker_pool import Rooms, WorkerPool, deaf_to_interrupts
+from solver.pours.worker_pool import Rooms, WorkerLost, WorkerPool, deaf_to_interrupts
 
 HEAP = with_values(
     load_material("sunflower_extract"), {"rig.mass": 0.003, "body.spheres": "coarse", "numerics.max_time": 0.4}
@@ -52,14 +53,44 @@ def test_a_workers_error_arrives_with_its_text(pool):
         list(pool.run_queue(queue, [HEAP]))
 
 
-def test_a_worker_that_is_killed_is_named():
-    with WorkerPool(1) as pool:
-        pours = pool.run_queue(deque([Job(HEAP, 1), Job(HEAP, 2)]), [HEAP])
-        next(pours)
-        ((process, _),) = pool._processes
-        os.kill(process.pid, signal.SIGKILL)
-        with pytest.raises(RuntimeError, match="a worker process has ended"):
-            list(pours)
+def kill(process):
+    os.kill(process.pid, signal.SIGKILL)
+    process.join()
+
+
+def test_the_pour_of_a_killed_worker_is_poured_by_another(taichi, pool):
+    """Killed between two queues, and while it pours; the bits are those of this process."""
+    jobs = [Job(HEAP, seed, tag=seed) for seed in range(3)]
+    list(pool.run_queue(deque(jobs[:1]), [HEAP]))
+    kill(pool._processes[0][0])
+    apart = {}
+    for job, record in pool.run_queue(deque(jobs), [HEAP]):
+        if not apart:
+            kill(pool._processes[1][0])
+        apart[job.tag] = record
+    assert sorted(apart) == [0, 1, 2]
+    for seed, record in run_pours(jobs, worlds=2):
+        np.testing.assert_array_equal(apart[seed].bodies.position, record.bodies.position)
+
+
+def test_a_pour_that_kills_every_worker_is_given_up_and_named(monkeypatch):
+    monkeypatch.setattr(worker_pool, "_worker", lambda: ended())
+    with WorkerPool(1) as pool, pytest.raises(WorkerLost, match=r"3 worker processes .* seed 7 of "):
+        list(pool.run_queue(deque([Job(HEAP, 7)]), [HEAP]))
+
+
+def takes_a_pour_and_ends(pipe):
+    pipe.recv()
+    pipe.recv()
+
+
+def ended():
+    """A worker that is gone as soon as it has been given a pour."""
+    ours, theirs = mp.Pipe()
+    process = mp.get_context("spawn").Process(target=takes_a_pour_and_ends, args=(theirs,))
+    process.start()
+    theirs.close()
+    return process, ours
 
 
 def test_nothing_is_left_after_close():
