@@ -35,6 +35,7 @@ from explorer.commands import (
     serve,
     shape,
     simulate,
+    store,
     validate_diagnosis,
     verify,
     warm_up,
@@ -143,6 +144,7 @@ app.command()(warm_up.warm_up)
 app.command()(validate_diagnosis.validate_diagnosis)
 app.command()(limit.limit)
 app.add_typer(measurements.app, name="measurements")
+app.add_typer(store.app, name="store")
 
 
 def main() -> None:

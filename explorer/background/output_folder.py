@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import json
+import os
 import re
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,6 +27,23 @@ def new_folder(folder: Path, stem: str) -> Path:
     dated = f"{stem}-{time.strftime('%Y%m%d-%H%M%S')}"
     names = [dated, *(f"{dated}-{k}" for k in range(2, 100))]
     return next(folder / name for name in names if not (folder / name).exists())
+
+
+@contextlib.contextmanager
+def kept_for_one(folder: Path) -> Iterator[None]:
+    """Make ``folder`` and keep other commands out of it while one writes there; however it ends, the folder is free.
+
+    Raises CommandError where another one is at work in it.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    except BlockingIOError:
+        raise CommandError(f"--out {folder}: another command is at work there; wait for it, or name another") from None
+    finally:
+        os.close(descriptor)
 
 
 def finished(folder: Path, result: str) -> tuple[Path, ...]:

@@ -25,7 +25,7 @@ from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summaries
 from doe.store import Store, default_store
-from explorer.background.output_folder import read_result
+from explorer.background.output_folder import kept_for_one, read_result
 from explorer.background.progress import PROGRESS, PourProgress
 from explorer.diagnosis.corrected import corrected_toml, study_toml
 from explorer.diagnosis.next_folder import read_next, write_next
@@ -106,14 +106,20 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> DiagnosisR
     measurement = load_measurement(order.folder)
     if order.out.is_file() or (order.out.is_dir() and any(order.out.iterdir()) and not order.resume):
         raise CommandError(f"--out {order.out}: is not empty; name a new folder, or add --resume to go on there")
-    names = order.effects or tuple(EFFECTS)
     asked = read_next(order.follow_up) if order.follow_up else None
-    follow_up = asked.measurement if asked else None
+    with kept_for_one(order.out):
+        return _run(order, measurement, asked.measurement if asked else None, say)
+
+
+def _run(
+    order: DiagnoseOrder, measurement: Measurement, follow_up: Measurement | None, say: Callable[[str], None]
+) -> DiagnosisResult:
+    """Pour, judge and write into ``order.out``, which is there and this command's alone."""
+    names = order.effects or tuple(EFFECTS)
     path = order.store or default_store()
     budget = Budget()
     if order.budget is not None:
         budget = scaled_budget(order.budget, measurement, names)
-    order.out.mkdir(parents=True, exist_ok=True)
     say(
         f"{order.folder}: {len(measurement.fit)} fitted and {len(measurement.holdout)} held-out conditions; store "
         f"{path}"

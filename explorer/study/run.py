@@ -37,7 +37,7 @@ from doe.studies.study_result import (
     StudyResult,
     Timing,
 )
-from explorer.background.output_folder import read_result
+from explorer.background.output_folder import kept_for_one, read_result
 from explorer.background.progress import PROGRESS, RunProgress, told_of_pauses
 from explorer.errors import CommandError
 from explorer.files.output_file import check_new_file, write_whole
@@ -106,10 +106,21 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
     own = [study.file, *([order.target] if order.target else [])]
     if order.out.is_file() or (holds_more_than(order.out, own) and not order.resume):
         raise CommandError(f"--out {order.out}: is not empty; name a new folder, or add --resume to go on there")
+    with kept_for_one(order.out):
+        return _run(order, study, profile, photographed, say)
+
+
+def _run(
+    order: StudyOrder,
+    study: Study,
+    profile: Profile,
+    photographed: PhotographedTarget | None,
+    say: Callable[[str], None],
+) -> StudyResult:
+    """Pour, analyse and write into ``order.out``, which is there and this command's alone."""
     planned = planned_runs(study, profile)
     path = order.store or default_store()
     store = Store(path)
-    order.out.mkdir(parents=True, exist_ok=True)
     if photographed is not None:
         photographed.copied(order.out / FOLDER)
         say(f"target: {photographed.line}")

@@ -9,6 +9,7 @@ import pytest
 
 from doe.pour_runner import TRIES
 from doe.studies.study_result import OWN_STAGES, Stages
+from explorer.background.output_folder import kept_for_one
 from explorer.photograph.target import FOLDER, load_target, remove_target
 from explorer.report import folder
 from explorer.study import run as study_run
@@ -50,6 +51,16 @@ def formula(monkeypatch):
 def calibrate(tmp_path, *options):
     store = ("--store", str(tmp_path / "runs.sqlite"))
     return explorer("calibrate", "--headless", "--profile", "quick", "--out", str(tmp_path / "out"), *store, *options)
+
+
+@pytest.mark.usefixtures("formula")
+def test_two_studies_in_one_folder_are_refused_and_the_first_is_left_alone(tmp_path):
+    with kept_for_one(tmp_path / "out"):
+        refused = calibrate(tmp_path, "--resume")
+    assert refused.exit_code == 2
+    assert refused.output.count("\n") == 1
+    assert "out: another command is at work there" in refused.output
+    assert not list((tmp_path / "out").iterdir())
 
 
 @pytest.mark.usefixtures("formula")

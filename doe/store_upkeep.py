@@ -1,0 +1,152 @@
+"""Looking after store files: is one whole, hand part of it on, bring two together, drop what is no longer wanted.
+
+All of it works on the raw pours; readings go with them. A file is changed in one transaction or not at all.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import sqlite3
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from doe.store import Store, StoredRun, StoreError
+from solver import RawPourError, unpacked
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What `check` found in a store file."""
+
+    physics: int
+    runs: dict[str, int]
+    """Study → runs."""
+    size: int
+    """[bytes]"""
+    damaged: tuple[str, ...]
+    """One line for each run whose raw pour cannot be read, and for what SQLite complains of; none in a whole store."""
+
+
+@dataclass(frozen=True)
+class Merged:
+    """How many runs of another store were added, and how many were there already."""
+
+    added: int
+    known: int
+
+
+def check(path: Path) -> Checked:
+    """Read every page of the file and every raw pour in it. Raises StoreError for a file that is no store."""
+    with _opened(path, readings_do=True) as (store, db):
+        complaints = [line for (line,) in db.execute("PRAGMA integrity_check") if line != "ok"]
+        runs: Counter[str] = Counter()
+        for run in store.runs() if not complaints else ():
+            runs[run.study] += 1
+            if (line := _unreadable(run)) is not None:
+                complaints.append(line)
+        return Checked(store.physics, dict(runs), path.stat().st_size, tuple(complaints))
+
+
+def export(path: Path, to: Path, study: str) -> int:
+    """Copy the runs of ``study`` into the new store file ``to``; returns how many.
+
+    Raises StoreError where there are none, or the new file exists.
+    """
+    if to.exists():
+        raise StoreError(f"{to}: exists already; choose another name, or merge into it")
+    with _opened(path) as (_, db):
+        _has(db, path, study)
+    try:
+        with contextlib.closing(Store(to, pouring=False)):
+            pass
+        with _opened(to) as (_, db), _attached(db, path), db:
+            # Of the physics that it was poured by, whatever that of this program is.
+            db.execute("UPDATE store SET physics = (SELECT physics FROM other.store)")
+            return db.execute("INSERT INTO pours SELECT * FROM other.pours WHERE study = ?", (study,)).rowcount
+    except StoreError:
+        to.unlink(missing_ok=True)
+        raise
+
+
+def merge(path: Path, other: Path) -> Merged:
+    """Add the runs of ``other`` to the store ``path``; a pour that both have stays as it is.
+
+    Raises StoreError, and adds nothing, for a store of another physics, and where both hold the same pour with
+    different bits: one of them was not poured by this solver, or is damaged.
+    """
+    if path.resolve() == other.resolve():
+        raise StoreError(f"{other}: is the store that it is to be merged into")
+    with _opened(other) as (theirs, _), _opened(path) as (ours, db):
+        if theirs.physics != ours.physics:
+            raise StoreError(
+                f"{other}: a store of physics {theirs.physics}, {path} is of physics {ours.physics}; only pours of one "
+                "physics go together"
+            )
+        with _attached(db, other), db:
+            odd = db.execute(
+                "SELECT pours.key FROM pours JOIN other.pours AS their ON pours.key = their.key "
+                "WHERE pours.raw != their.raw LIMIT 1"
+            ).fetchone()
+            if odd:
+                raise StoreError(f"{other}: run {odd[0][:12]} is another pour there than in {path}; nothing was merged")
+            (total,) = db.execute("SELECT count(*) FROM other.pours").fetchone()
+            added = db.execute("INSERT OR IGNORE INTO pours SELECT * FROM other.pours").rowcount
+        return Merged(added, total - added)
+
+
+def prune(path: Path, study: str) -> int:
+    """Remove the runs of ``study`` and give their room back; returns how many. Raises StoreError where there are none.
+
+    A pour that another study found in the store is kept under the study that poured it first: that one has to pour it
+    again.
+    """
+    with _opened(path) as (_, db):
+        _has(db, path, study)
+        with db:
+            removed = db.execute("DELETE FROM pours WHERE study = ?", (study,)).rowcount
+        db.execute("VACUUM")
+        return removed
+
+
+def _has(db: sqlite3.Connection, path: Path, study: str) -> None:
+    found = [name for (name,) in db.execute("SELECT DISTINCT study FROM pours ORDER BY study")]
+    if study not in found:
+        raise StoreError(f"{path}: no runs of {study!r}; allowed: {', '.join(found) or 'none, it is empty'}")
+
+
+def _unreadable(run: StoredRun) -> str | None:
+    try:
+        if run.raw:
+            unpacked(run.raw)
+    except RawPourError as error:
+        return f"run {run.key[:12]} of {run.study}: {error}"
+    return None
+
+
+@contextlib.contextmanager
+def _opened(path: Path, readings_do: bool = False) -> Iterator[tuple[Store, sqlite3.Connection]]:
+    """The store and a connection of its own; what SQLite complains of meanwhile is a StoreError.
+
+    ``readings_do``: also a store from before raw pours were kept.
+    """
+    if not path.is_file():
+        raise StoreError(f"{path}: there is no such store")
+    with contextlib.closing(Store(path, pouring=False)) as store:
+        if not store.physics and not readings_do:
+            raise StoreError(f"{path}: holds readings without raw pours; `explorer runs --csv --store {path}` lists it")
+        try:
+            with contextlib.closing(sqlite3.connect(path, timeout=60.0)) as db:
+                yield store, db
+        except sqlite3.Error as error:
+            raise StoreError(f"{path}: cannot be used as a store of runs ({error})") from None
+
+
+@contextlib.contextmanager
+def _attached(db: sqlite3.Connection, other: Path) -> Iterator[None]:
+    db.execute("ATTACH DATABASE ? AS other", (str(other),))
+    try:
+        yield
+    finally:
+        db.execute("DETACH DATABASE other")

@@ -1,0 +1,84 @@
+"""``explorer store``: look after the files that keep pours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+app = typer.Typer(help="Look after the files that keep pours.", no_args_is_help=True)
+FAILURE = 1
+STORE = typer.Option(None, "--store", help="SQLite file that keeps the runs.")
+STUDY = typer.Option(..., help="Name of the study, as `explorer runs` lists it.")
+
+
+@app.callback()
+def store() -> None:
+    """Look after the files that keep pours."""
+
+
+@app.command()
+def check(file: Path | None = STORE) -> None:
+    """Read every page and every raw pour; exit with 1 if something is damaged."""
+    from doe import store_upkeep
+    from doe.store import default_store
+
+    path = file or default_store()
+    found = store_upkeep.check(path)
+    made = f"physics {found.physics}" if found.physics else "readings without raw pours"
+    typer.echo(f"{path}: {made}, {sum(found.runs.values())} runs, {found.size / 1e6:.1f} MB")
+    for study, number in sorted(found.runs.items()):
+        typer.echo(f"  {study}: {number}")
+    for line in found.damaged:
+        typer.echo(f"damaged: {line}", err=True)
+    if found.damaged:
+        raise typer.Exit(FAILURE)
+    typer.echo("whole: every raw pour can be read")
+
+
+@app.command()
+def export(
+    to: Path = typer.Argument(..., metavar="NEW.sqlite", help="New store for the copies."),
+    study: str = STUDY,
+    file: Path | None = STORE,
+) -> None:
+    """Copy a study's runs into a store of their own; `explorer runs --csv` writes readings as a table."""
+    from doe import store_upkeep
+    from doe.store import default_store
+
+    number = store_upkeep.export(file or default_store(), to, study)
+    typer.echo(f"{to}: {number} runs of {study}")
+
+
+@app.command()
+def merge(
+    other: Path = typer.Argument(..., metavar="OTHER.sqlite", help="Store whose runs are added."),
+    file: Path | None = STORE,
+) -> None:
+    """Add the runs of another store, e.g. of another machine; what both have is kept once."""
+    from doe import store_upkeep
+    from doe.store import default_store
+
+    path = file or default_store()
+    found = store_upkeep.merge(path, other)
+    typer.echo(f"{path}: {found.added} runs added, {found.known} were there already")
+
+
+@app.command()
+def prune(
+    study: str = STUDY,
+    file: Path | None = STORE,
+    yes: bool = typer.Option(False, "--yes", help="Remove them; without it only their number is told."),
+) -> None:
+    """Remove a study's runs and give their room on the disk back."""
+    from doe import store_upkeep
+    from doe.store import default_store
+
+    path = file or default_store()
+    if not yes:
+        number = store_upkeep.check(path).runs.get(study, 0)
+        typer.echo(f"{path}: {number} runs of {study} would be removed; add --yes")
+        return
+    before = path.stat().st_size
+    number = store_upkeep.prune(path, study)
+    typer.echo(f"{path}: {number} runs of {study} removed, {(before - path.stat().st_size) / 1e6:.1f} MB given back")

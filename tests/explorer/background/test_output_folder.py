@@ -1,0 +1,33 @@
+"""One command at a time writes in a folder, and a killed one leaves it free."""
+
+import subprocess
+import sys
+
+import pytest
+
+from explorer.background.output_folder import kept_for_one
+from explorer.errors import CommandError
+
+AT_WORK = """
+import sys
+from pathlib import Path
+from explorer.background.output_folder import kept_for_one
+with kept_for_one(Path(sys.argv[1])):
+    print("at work", flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_a_second_command_is_refused_while_the_first_is_at_work_and_a_killed_one_leaves_the_folder_free(tmp_path):
+    folder = tmp_path / "out"
+    command = [sys.executable, "-c", AT_WORK, folder]
+    first = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert first.stdout.readline() == "at work\n"
+    with pytest.raises(CommandError, match=f"--out {folder}: another command is at work there"), kept_for_one(folder):
+        pass
+    first.kill()
+    first.communicate()
+    with kept_for_one(folder):
+        assert folder.is_dir()
+    with kept_for_one(folder):
+        pass
