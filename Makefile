@@ -8,7 +8,7 @@ BIN := .venv/bin
 EXPLORER := $(BIN)/explorer
 
 .DEFAULT_GOAL := help
-.PHONY: help venv serve calibrate calibrate-quick diagnose test slow nightly pictures preview page-speed peers foreign rolling golden clean
+.PHONY: help venv serve calibrate calibrate-quick diagnose test slow nightly pictures preview page-speed faults peers foreign rolling golden clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 18
@@ -56,6 +56,10 @@ preview: .venv/.ready ## record the pour that the page shows while its solver lo
 
 page-speed: .venv/.ready ## frames/s and slider echo of the page: one and two browsers, beside a study, over a slow line (6 min)
 	$(BIN)/python -m tests.browser.page_speed
+
+faults: .venv/.ready ## a study killed 20 times and a diagnosis 10 times, against unbroken ones (an hour)
+	$(BIN)/python -m tests.faults.kills study --kills 20
+	$(BIN)/python -m tests.faults.kills diagnosis --kills 10
 
 foreign: .venv/.ready ## data sets poured by LIGGGHTS with effects that no file states, judged (an hour)
 	$(BIN)/python -m tests.peers.foreign_sets results/foreign.sqlite

@@ -93,6 +93,10 @@ class Optimum(Record):
     better_than_noise: bool
     statement: str
 
+    def identifies(self, k: int) -> bool:
+        """Whether the target identifies factor ``k``; one that is out of reach identifies none."""
+        return self.reached and self.names[k] not in self.unidentified
+
 
 @dataclass(frozen=True)
 class Compromise(Record):

@@ -46,6 +46,24 @@ class SurfaceResult(Record):
         return f"R² {a.r_squared:.2f}, adjusted {a.r_squared_adjusted:.2f}, predicted {a.r_squared_predicted:.2f}"
 
 
+CONTRADICTION = 0.01
+"""Below this chance of their misfit several targets contradict each other, and identify nothing."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What the targets say of one factor [SI].
+
+    ``low`` … ``high``: its 95 % interval where it is ``identified``, else the range that gives the target; NaN where
+    none does.
+    """
+
+    value: float
+    low: float
+    high: float
+    identified: bool
+
+
 @dataclass(frozen=True)
 class OptimumResult(Record):
     """The chosen setting: path → value [SI], and how it was found (one target: ``single``, several: ``compromise``).
@@ -59,6 +77,22 @@ class OptimumResult(Record):
     single: Optimum
     compromise: Compromise | None
     posterior: JointPosterior | None = None
+
+    @property
+    def estimates(self) -> dict[str, Estimate]:
+        """Path → what is known of each factor. Of several targets the joint posterior says it, where there is one."""
+        joint = self.posterior if self.compromise is not None else None
+        found = {}
+        for k, factor in enumerate(self.factors):
+            if joint is not None:
+                ends, known = (joint.low[k], joint.high[k]), joint.identified[k] and joint.p >= CONTRADICTION
+            else:
+                known = self.single.identifies(k)
+                one = self.single
+                low, high = (one.point_low, one.point_high) if known else (one.solution_low, one.solution_high)
+                ends = low[k], high[k]
+            found[factor.path] = Estimate(self.values[factor.path], float(ends[0]), float(ends[1]), known)
+        return found
 
     @property
     def line(self) -> str:

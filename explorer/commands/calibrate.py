@@ -7,7 +7,7 @@ from pathlib import Path
 
 import typer
 
-FAILURE, ABOVE_LIMIT = 1, 3
+FAILURE, ABOVE_LIMIT, MOVED = 1, 3, 4
 
 
 def calibrate(
@@ -35,14 +35,24 @@ def calibrate(
     author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
     notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
     fail_above: float | None = typer.Option(None, min=0.0, help="Exit with 3 above this relative error in percent."),
+    baseline: Path | None = typer.Option(
+        None, metavar="RESULT.json", help="Earlier result: exit with 4 if verdict, mean, noise or parameters moved."
+    ),
+    summary: Path | None = typer.Option(None, metavar="FILE.md", help="Verdict and what moved, as Markdown for CI."),
+    junit: Path | None = typer.Option(None, metavar="FILE.xml", help="The same as JUnit XML, a case per question."),
 ) -> None:
     """Calibrate a material: pilot, reach, screening, ascent, response surface, optimum, verification, report."""
     from doe.errors import StudyStopped
+    from doe.studies.baseline import BaselineError, compare, moved
     from explorer.errors import CommandError
+    from explorer.files.output_file import write_whole
+    from explorer.study import for_ci
     from explorer.study.run import StudyOrder, run_study
 
     if not headless:
         raise CommandError("calibrate: add --headless to run here, or start it from the panel of `explorer serve`")
+    # Before any pour: a file that is no result is told at once.
+    before = for_ci.read_baseline(baseline) if baseline is not None else None
     # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished runs kept.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     one_file = record is not None and record.suffix == ".rrd"
@@ -55,7 +65,19 @@ def calibrate(
     except StudyStopped as stopped:
         typer.echo(f"error: {' '.join(str(stopped).split())}", err=True)
         raise typer.Exit(FAILURE) from None
+    try:
+        compared = () if before is None else compare(before, result)
+    except BaselineError as error:
+        raise CommandError(f"--baseline {baseline}: {error}") from None
+    if summary is not None:
+        write_whole(summary, for_ci.summary(result, compared))
+    if junit is not None:
+        write_whole(junit, for_ci.junit(result, compared, fail_above))
+    for one in (gone := moved(compared)):
+        typer.echo(f"moved: {for_ci.change(one)} ({one.why or one.answer})", err=True)
     error_percent = result.verification.tests[0].relative_error_percent
     if fail_above is not None and not error_percent <= fail_above:
         typer.echo(f"relative error {error_percent:.2f} % is above the limit of {fail_above:g} %", err=True)
         raise typer.Exit(ABOVE_LIMIT)
+    if gone:
+        raise typer.Exit(MOVED)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from doe.analysis.surface_anova import SurfaceAnova
 from doe.studies.study_result import StudyResult
 from explorer.report.content import DataTable
-from explorer.report.identified import is_identified
 from explorer.report.set_up import is_assumed
 from explorer.units import parameter_units
 
@@ -109,7 +108,7 @@ def _parameters(result: StudyResult) -> DataTable:
         if k is None:
             rows.append((*row, None, None, None, None))
             continue
-        known = is_identified(single, k)
+        known = single.identifies(k)
         ends = (single.point_low, single.point_high) if known else (single.solution_low, single.solution_high)
         rows.append((*row, result.optimum.values[path], *(float(end[k]) for end in ends), "yes" if known else "no"))
     header = ("path", "value", "unit", "origin", "source", "at_optimum", "low", "high", "identified")

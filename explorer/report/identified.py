@@ -10,14 +10,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from doe.analysis.optimum import Optimum
 from doe.stages.surface import OptimumResult
 from explorer.report.content import Strong
 from explorer.units import MISSING, enumeration, parameter_label, parameter_range, parameter_value, percent
 
 BY_RULE = "chosen by rule"
-CONTRADICTION = 0.01
-"""Below this chance of their misfit several targets contradict each other, and identify nothing."""
 GIVES_TARGET = "range that gives the target"
 """What `Setting.feasible` is called in tables and charts."""
 
@@ -71,11 +68,6 @@ def settings(optimum: OptimumResult) -> tuple[FactorSetting, ...]:
     return tuple(_setting(optimum, k) for k in range(len(optimum.factors)))
 
 
-def is_identified(single: Optimum, k: int) -> bool:
-    """Whether the target identifies factor ``k``; one that is out of reach identifies none."""
-    return single.reached and single.names[k] not in single.unidentified
-
-
 def all_identified(optimum: OptimumResult) -> bool:
     """Whether the target identifies every factor, so that the point is more than a choice."""
     return all(one.identified for one in settings(optimum))
@@ -104,12 +96,13 @@ def cloud_caution(optimum: OptimumResult) -> str:
 
 def _setting(optimum: OptimumResult, k: int) -> FactorSetting:
     single, factor = optimum.single, optimum.factors[k]
-    path, identified, share = factor.path, is_identified(single, k), float(single.solution_share[k])
+    path, share = factor.path, float(single.solution_share[k])
     low, high = float(single.solution_low[k]), float(single.solution_high[k])
     ends = float(single.point_low[k]), float(single.point_high[k])
     if optimum.compromise is not None and (joint := optimum.posterior) is not None:
         low, high = ends = float(joint.low[k]), float(joint.high[k])
-        identified, share = joint.identified[k] and joint.p >= CONTRADICTION, float(joint.share[k])
+        share = float(joint.share[k])
+    identified = optimum.estimates[path].identified
     return FactorSetting(
         name=factor.name,
         label=parameter_label(path),

@@ -39,7 +39,7 @@ from explorer.report.figures.style import (
     side_by_side,
     suffix,
 )
-from explorer.report.identified import BY_RULE, GIVES_TARGET, all_identified, is_identified
+from explorer.report.identified import BY_RULE, GIVES_TARGET, all_identified
 from explorer.units import (
     axis_title,
     observable_title,
@@ -222,7 +222,7 @@ def ranges(fitted: FittedTarget) -> Spec:
     assert fitted.chosen is not None
     found, factors = fitted.optimum.single, fitted.factors
     rows = [label(f"{factor.name} · {parameter_label(factor.path)}") for factor in factors]
-    known = [is_identified(found, k) for k in range(len(factors))]
+    known = [found.identifies(k) for k in range(len(factors))]
     set_low, set_high = (_where(known, end) for end in (found.point_low, found.point_high))
     bars = (
         ("region of the surface", fitted.low, fitted.high, DUMMY, 22),

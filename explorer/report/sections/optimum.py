@@ -8,16 +8,14 @@ import numpy as np
 
 from doe.analysis.joint_posterior import JointPosterior
 from doe.analysis.optimum import Compromise
-from doe.stages.surface import OptimumResult
+from doe.stages.surface import CONTRADICTION, OptimumResult
 from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Figure, Section, Struck, Table, Text
 from explorer.report.figures.model import cloud, fitted_targets, ranges
 from explorer.report.figures.posterior import corner, overlaid
 from explorer.report.identified import (
-    CONTRADICTION,
     GIVES_TARGET,
     cloud_caution,
-    is_identified,
     rule,
     settings,
 )
@@ -92,7 +90,7 @@ def _statement(result: StudyResult) -> str:
         "at 95 %."
     )
     error = single.target_standard_error
-    any_identified = any(is_identified(single, k) for k in range(len(single.names)))
+    any_identified = any(single.identifies(k) for k in range(len(single.names)))
     including = "The 95 % set and this share include" if any_identified else "This share includes"
     text += (
         f" {including} the target's own standard error, {observed(name, error)}."

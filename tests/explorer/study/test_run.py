@@ -3,6 +3,7 @@
 import dataclasses
 import json
 from types import SimpleNamespace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -176,6 +177,45 @@ def test_a_study_with_its_own_profiles_is_asked_for_by_their_names(tmp_path):
     assert refused.stderr == f"error: {file}: profile: 'standard' is not one of first look, thesis-2, fine\n"
     assert explorer("calibrate", "--headless", "--profile", "first look", *options).exit_code == 0
     assert json.loads((tmp_path / "out" / "result.json").read_text())["study"]["profile"]["name"] == "first look"
+
+
+@pytest.mark.usefixtures("formula")
+def test_against_a_baseline_what_moved_is_named_in_every_file_and_by_exit_code_4(tmp_path, monkeypatch):
+    """Three files for CI: the result to compare with, a summary, JUnit XML; then pours scatter 8 times as much."""
+    assert calibrate(tmp_path).exit_code == 0
+    (tmp_path / "out").rename(tmp_path / "accepted")
+    options = ("--baseline", str(tmp_path / "accepted/result.json"))
+    options += ("--summary", str(tmp_path / "summary.md"), "--junit", str(tmp_path / "junit.xml"))
+    same = calibrate(tmp_path, *options)
+    assert same.exit_code == 0, same.output
+    assert "Against the baseline: nothing has moved" in (tmp_path / "summary.md").read_text()
+    suite = ElementTree.parse(tmp_path / "junit.xml").getroot()
+    assert suite.get("failures") == "0"
+    assert int(suite.get("tests")) == len(suite) > 4
+
+    monkeypatch.setattr(study_run, "PourRunner", Noisier)
+    other = calibrate(tmp_path, "--resume", *options)
+    assert other.exit_code == 4
+    lines = [line for line in other.stderr.splitlines() if line.startswith("moved: ")]
+    suite = ElementTree.parse(tmp_path / "junit.xml").getroot()
+    assert len(lines) == int(suite.get("failures")) == len(suite.findall("testcase/failure")) > 0
+    assert f"{len(lines)} of {len(suite)} have moved" in (tmp_path / "summary.md").read_text()
+
+
+class Noisier(Formula):
+    def __init__(self, *arguments, **options):
+        super().__init__(*arguments, **options)
+        self.sigma *= 8.0
+
+
+@pytest.mark.parametrize(("content", "says"), [("{}", "no result.json of a finished study"), ("no", "no result.json")])
+def test_a_baseline_that_is_none_is_told_before_any_pour(tmp_path, content, says):
+    (tmp_path / "old.json").write_text(content)
+    refused = calibrate(tmp_path, "--baseline", str(tmp_path / "old.json"))
+    assert refused.exit_code == 2
+    assert refused.stderr.startswith(f"error: --baseline {tmp_path / 'old.json'}: {says}")
+    assert refused.stderr.count("\n") == 1
+    assert not (tmp_path / "out").exists()
 
 
 def test_without_headless_it_says_where_to_go(tmp_path):

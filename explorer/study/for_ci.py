@@ -1,0 +1,96 @@
+"""What an automatic check reads of a calibration: a summary in Markdown, and JUnit XML with a case per question."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from xml.etree import ElementTree
+
+from doe.record import RecordError
+from doe.studies.baseline import Compared, moved
+from doe.studies.study_result import StudyResult
+from explorer.errors import CommandError
+from explorer.report.identified import settings
+from explorer.units import observable_label, observed, parameter_label, parameter_value
+
+
+def read_baseline(path: Path) -> StudyResult:
+    """The finished result in ``path``. Raises CommandError in one line."""
+    try:
+        return StudyResult.from_dict(json.loads(path.read_text(encoding="utf-8")))
+    except (RecordError, ValueError) as error:
+        raise CommandError(f"--baseline {path}: no result.json of a finished study ({error})") from None
+
+
+def summary(result: StudyResult, compared: Sequence[Compared]) -> str:
+    """Verdict, parameters, and what has moved against the baseline, as Markdown."""
+    lines = [f"# {result.study.title}: calibration", ""]
+    for target, test in zip(result.verification.targets, result.verification.tests, strict=True):
+        name, found = target.observable, test.simulated
+        lines += [
+            f"**{test.verdict}**: {test.statement} Simulated {observed(name, found.mean)} "
+            f"(SD {observed(name, found.sd)}, n = {found.n}), measured {observed(name, target.mean)}; relative error "
+            f"{test.relative_error_percent:.2f} %.",
+            "",
+        ]
+    lines += ["| parameter | value, 95 % interval, or the range that gives the target |", "|---|---|"]
+    lines += [f"| {one.label} | {one.answer} |" for one in settings(result.optimum)]
+    if compared:
+        gone = moved(tuple(compared))
+        verdict = f"{len(gone)} of {len(compared)} have moved" if gone else "nothing has moved"
+        lines += ["", f"## Against the baseline: {verdict}", "", "| quantity | before | now | answer | why |"]
+        lines += ["|---|---|---|---|---|"]
+        lines += map(_row, compared)
+    return "\n".join(lines) + "\n"
+
+
+def junit(result: StudyResult, compared: Sequence[Compared], fail_above: float | None) -> str:
+    """One case per quantity compared, failed if it has moved, and one for the limit on the relative error."""
+    error = result.verification.tests[0].relative_error_percent
+    cases = [(_what(one), one.why, change(one) if one.answer == "moved" else "") for one in compared]
+    if fail_above is not None:
+        above = "" if error <= fail_above else f"relative error {error:.2f} % is above the limit of {fail_above:g} %"
+        cases.append(("relative error", f"{error:.2f} %", above))
+    if not cases:
+        cases.append(("finished", result.verification.line, ""))
+    failed = sum(bool(fault) for _, _, fault in cases)
+    suite = ElementTree.Element(
+        "testsuite",
+        name=f"calibration of {result.study.name}",
+        tests=str(len(cases)),
+        failures=str(failed),
+        errors="0",
+        skipped="0",
+        time=f"{result.timing.total_s:.1f}",
+    )
+    for name, why, fault in cases:
+        case = ElementTree.SubElement(suite, "testcase", classname=result.study.name, name=name, time="0")
+        if fault:
+            ElementTree.SubElement(case, "failure", message=fault).text = why
+        elif why:
+            ElementTree.SubElement(case, "system-out").text = why
+    ElementTree.indent(suite)
+    return ElementTree.tostring(suite, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _what(one: Compared) -> str:
+    if one.kind == "parameter":
+        return parameter_label(one.name)
+    return f"{observable_label(one.name)}: {one.kind}"
+
+
+def _value(one: Compared, value: float | str) -> str:
+    if isinstance(value, str):
+        return value
+    return parameter_value(one.name, value) if one.kind == "parameter" else observed(one.name, value)
+
+
+def _row(one: Compared) -> str:
+    answer = f"**{one.answer}**" if one.answer == "moved" else one.answer
+    return f"| {_what(one)} | {_value(one, one.before)} | {_value(one, one.now)} | {answer} | {one.why} |"
+
+
+def change(one: Compared) -> str:
+    """E.g. "static friction seed–seed: 0.31 before, 0.42 now"."""
+    return f"{_what(one)}: {_value(one, one.before)} before, {_value(one, one.now)} now"
