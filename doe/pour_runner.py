@@ -77,7 +77,7 @@ class PourRunner:
     ``tries`` seeds are tried for one replicate. ``seeds`` are those of the replicates, of which then none is replaced;
     None: a stream of its own for every run (:func:`seed_of`). ``experiments``: the scenes of the study's further
     experiments by name. Pours run in this process, where ``observer`` can watch
-    them, or as ``pours`` says (``solver.WorkerPool.run_queue``).
+    them, or as ``pours`` says (``solver.Executor.run_queue``).
     """
 
     def __init__(

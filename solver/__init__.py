@@ -78,6 +78,7 @@ from solver.version import PHYSICS
 if TYPE_CHECKING:
     from solver.engine.world import Batch
     from solver.photograph import PhotographedPile, PhotographError, open_picture, read_photograph
+    from solver.pours.executor import Executor, executor
     from solver.pours.pour import Pour
     from solver.pours.run import Job, capacity_for, run_pour, run_pours, run_queue
     from solver.pours.worker_pool import WorkerPool, begin_worker, warm_up
@@ -85,12 +86,14 @@ if TYPE_CHECKING:
 _LATE = {
     "Batch": "solver.engine.world",
     "WorkerPool": "solver.pours.worker_pool",
+    "Executor": "solver.pours.executor",
     "Job": "solver.pours.run",
     "PhotographError": "solver.photograph",
     "PhotographedPile": "solver.photograph",
     "Pour": "solver.pours.pour",
     "begin_worker": "solver.pours.worker_pool",
     "capacity_for": "solver.pours.run",
+    "executor": "solver.pours.executor",
     "open_picture": "solver.photograph",
     "read_photograph": "solver.photograph",
     "run_pour": "solver.pours.run",
@@ -125,6 +128,7 @@ __all__ = [
     "ClumpFit",
     "EffectTables",
     "Entries",
+    "Executor",
     "Frame",
     "HeightMap",
     "InsertionTable",
@@ -169,6 +173,7 @@ __all__ = [
     "capacity_for",
     "checked",
     "coarsened",
+    "executor",
     "frame_of",
     "height_map",
     "instance_of",

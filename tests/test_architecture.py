@@ -23,6 +23,7 @@ THIRD_PARTY_HOMES = {
     "rerun": ("explorer/logs/",),
     "typer": ("explorer/cli.py", "explorer/commands/"),
     "taichi": ("solver/backend.py",),
+    "distributed": ("solver/pours/dask_pool.py",),
 }
 
 # The rest of doe is statistics and must stay testable without Taichi.

@@ -57,9 +57,10 @@ ROUNDS = 4
 class CampaignOrder:
     """What is asked for.
 
-    minutes: stop after so long, infinite by default; 0: judge nothing. shard: every ``of``-th set from the ``shard``-th
-    on. wide: sets of all strengths, for development. follow_up: whether ambiguous answers are followed up, which takes
-    most of the time. cases: instead of the schedule's. strengths: instead of those by the laboratory's reference pours.
+    minutes: stop after so long, infinite by default; 0: judge nothing. scheduler: of Dask, whose workers pour.
+    shard: every ``of``-th set from the ``shard``-th on. wide: sets of all strengths, for development. follow_up:
+    whether ambiguous answers are followed up, which takes most of the time. cases: instead of the schedule's.
+    strengths: instead of those by the laboratory's reference pours.
     """
 
     out: Path
@@ -68,6 +69,7 @@ class CampaignOrder:
     store: Path | None = None
     minutes: float = float("inf")
     workers: int | None = None
+    scheduler: str = ""
     shard: int = 1
     of: int = 1
     wide: bool = False
@@ -106,7 +108,9 @@ def run_campaign(order: CampaignOrder, say: Say) -> list[SetRow]:
         with ExitStack() as stack:
             store = Store(order.store or default_store())
             stack.callback(store.close)
-            place = stack.enter_context(WorkPlace(store, order.workers or os.cpu_count() or 1, deadline))
+            place = stack.enter_context(
+                WorkPlace(store, order.workers or os.cpu_count() or 1, deadline, order.scheduler)
+            )
             try:
                 strengths = order.strengths or measured_strengths(order, laboratory, place, say)
                 answers = Answers(laboratory, strengths, place, order.budget, order.follow_up)

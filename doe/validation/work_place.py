@@ -18,7 +18,7 @@ from doe.pour_runner import stored_run
 from doe.store import Store
 from doe.validation.laboratory import LaboratoryPour
 from doe.validation.outside import AMPLITUDE, ON_BENCH, OUTSIDE, magnified, outside_pour
-from solver import Job, Outcome, Record, Scene, WorkerPool, begin_worker, pour_key, unpacked
+from solver import Executor, Job, Outcome, Record, Scene, begin_worker, executor, pour_key, unpacked
 
 
 class OutOfTimeError(Exception):
@@ -62,11 +62,11 @@ class PourOrder:
 class WorkPlace:
     """Workers and a deadline [s] on ``time.monotonic``; a context that ends the workers."""
 
-    def __init__(self, store: Store, workers: int, deadline: float = math.inf) -> None:
-        self.store, self.workers, self.deadline = store, workers, deadline
+    def __init__(self, store: Store, workers: int, deadline: float = math.inf, scheduler: str = "") -> None:
+        self.store, self.workers, self.deadline, self.scheduler = store, workers, deadline, scheduler
         self.poured = 0
         self._stack = ExitStack()
-        self._pool: WorkerPool | None = None
+        self._pool: Executor | None = None
         self._beside: Pool | None = None
 
     def __enter__(self) -> "WorkPlace":
@@ -76,10 +76,10 @@ class WorkPlace:
         self._stack.__exit__(*error)
 
     @property
-    def pool(self) -> WorkerPool:
+    def pool(self) -> Executor:
         """The pool, started when it is first needed."""
         if self._pool is None:
-            self._pool = self._stack.enter_context(WorkerPool(self.workers))
+            self._pool = self._stack.enter_context(executor(self.workers, self.scheduler))
         return self._pool
 
     def pours(self, queue: deque[Job], room: Sequence[Scene]) -> Iterator[tuple[Job, Record]]:

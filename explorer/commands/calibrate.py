@@ -28,6 +28,7 @@ def calibrate(
         help="New recording of the piles, a finished OUT is only recorded; or a folder for all verification pours.",
     ),
     threads: int | None = typer.Option(None, min=1, help="CPU threads; all if not given."),
+    scheduler: str = typer.Option("", metavar="tcp://…", help="Pour on the workers of this Dask scheduler."),
     tries: int = typer.Option(3, min=1, max=20, help="Seeds tried for one replicate that gives no valid pour."),
     beyond_reach: bool = typer.Option(
         False, "--beyond-reach", help="Go on where no setting of the factors comes near the target."
@@ -58,7 +59,20 @@ def calibrate(
     one_file = record is not None and record.suffix == ".rrd"
     folder, piles = (None, record) if one_file else (record, None)
     order = StudyOrder(
-        study, profile, out, resume, store, folder, threads, tries, author, notes, target, beyond_reach, piles
+        study,
+        profile,
+        out,
+        resume,
+        store,
+        folder,
+        threads,
+        tries,
+        author,
+        notes,
+        target,
+        beyond_reach,
+        piles,
+        scheduler,
     )
     try:
         result = run_study(order, typer.echo)

@@ -18,6 +18,7 @@ def diagnose(
     resume: bool = typer.Option(False, "--resume", help="Go on in a folder that is not empty."),
     store: Path | None = typer.Option(None, help="SQLite file that keeps every pour."),
     threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),
+    scheduler: str = typer.Option("", metavar="tcp://…", help="Pour on the workers of this Dask scheduler."),
     seed: int = typer.Option(0, min=0, help="Of the pours; another one asks for others."),
     follow_up: Path | None = typer.Option(
         None, "--follow-up", metavar="DIR", help="The folder OUT/next of an ambiguous answer, filled in."
@@ -50,5 +51,6 @@ def diagnose(
         author=author,
         notes=notes,
         record=record,
+        scheduler=scheduler,
     )
     run_diagnose(order, typer.echo)

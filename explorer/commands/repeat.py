@@ -16,6 +16,7 @@ def repeat(
     out: Path | None = typer.Option(None, help="New folder for the progress, which the page reads."),
     store: Path | None = typer.Option(None, help="SQLite file that keeps every pour."),
     threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),
+    scheduler: str = typer.Option("", metavar="tcp://…", help="Pour on the workers of this Dask scheduler."),
 ) -> None:
     """Pour a scene with more seeds, keep every pour in the store, and print what all of its seeds gave.
 
@@ -28,7 +29,7 @@ def repeat(
     # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished pours kept.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     scene = with_settings(load_scene(source, material), set_)
-    found = pour_more(PoursOrder(scene, pours, out, store, threads), typer.echo)
+    found = pour_more(PoursOrder(scene, pours, out, store, threads, scheduler), typer.echo)
     rows = [
         [one.observable, f"{one.sample.mean:.4g}", f"{one.sample.sd:.4g}", str(one.n), str(one.void)]
         for one in found

@@ -45,6 +45,7 @@ def simulate(
     seed: int = typer.Option(1, min=0, help="Seed of the first pour."),
     replicates: int = typer.Option(1, min=1, max=10_000, help="Number of pours, with seeds SEED, SEED + 1, …"),
     threads: int | None = typer.Option(None, min=1, help="CPU threads; all by default."),
+    scheduler: str = typer.Option("", metavar="tcp://…", help="Pour on the workers of this Dask scheduler."),
     out: Path | None = typer.Option(None, help="New folder for result.json, curves, piles and parameters."),
     record: Path | None = typer.Option(
         None, metavar="FILE.rrd", help="New recording; FILE_<seed>.rrd for several pours."
@@ -68,7 +69,7 @@ def simulate(
     from explorer.files.run_result import result_of
     from explorer.scene.file import load_scene, with_settings
     from explorer.tables.pours import RunTable, bench_data, bench_text, write_bench
-    from solver import Job, WorkerPool, run_pours
+    from solver import Job, executor, run_pours
     from solver.arch import chosen
     from solver.pours.checkpoint import read_checkpoint
     from solver.rigs import BENCH_RIGS
@@ -122,7 +123,7 @@ def simulate(
         jobs = [Job(scene, s, tag=k, interrupted=interrupted) for k, s in enumerate(seeds)]
         if replicates > 1 and not (recorder or kept) and chosen() == "cpu":
             # Nobody looks at them from within, so they run in processes of their own: in one, all wait for the slowest.
-            pool = stack.enter_context(WorkerPool(min(threads or os.cpu_count() or 1, replicates)))
+            pool = stack.enter_context(executor(min(threads or os.cpu_count() or 1, replicates), scheduler))
             ended: Iterator[tuple[int, Record]] = (
                 (job.tag, finished) for job, finished in pool.run_queue(deque(jobs), [scene])
             )

@@ -26,6 +26,7 @@ def validate_diagnosis(
     ),
     store: Path | None = typer.Option(None, help="SQLite file that keeps every pour."),
     threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),
+    scheduler: str = typer.Option("", metavar="tcp://…", help="Pour on the workers of this Dask scheduler."),
 ) -> None:
     """Diagnose made-up data with known truths and print how often the answer is right."""
     import math
@@ -49,6 +50,7 @@ def validate_diagnosis(
         of=int(of),
         wide=wide,
         follow_up=follow_up,
+        scheduler=scheduler,
         laboratory=laboratory or TREFOILS,
     )
     typer.echo(campaign_text(run_campaign(order, typer.echo)))

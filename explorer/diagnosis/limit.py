@@ -24,7 +24,7 @@ from doe.validation.replay import BASE_POURS, NULLS, PlantedTruth, Replayed, Tea
 from explorer.files.output_file import write_whole
 from explorer.files.run_folder import json_text
 from explorer.tables.text_table import text_table
-from solver import EFFECTS, PHYSICS, WorkerPool
+from solver import EFFECTS, PHYSICS, executor
 
 TEACHINGS, SPLITS = (Teaching(4, 0), Teaching(4, 12), Teaching(8, 12)), 20
 """What teaches the rule, and splits of the reference into pours that teach and data."""
@@ -112,7 +112,7 @@ def _poured(
     with ExitStack() as stack:
         store = Store(order.store or default_store())
         stack.callback(store.close)
-        pool = stack.enter_context(WorkerPool(order.threads))
+        pool = stack.enter_context(executor(order.threads))
         paths = [parameter.path for parameter in measurement.parameters]
         pours = ModelPours(measurement.fit, paths, store, pool.run_queue, on_pour, ROOT)
         return extended_to(found, order.rounds, declared, pours, order.reference, say)

@@ -53,7 +53,7 @@ from explorer.files.output_file import check_new_file, write_whole
 from explorer.files.run_result import made_today, versions
 from explorer.report.diagnosis import diagnosis_report
 from explorer.report.folder import write_report
-from solver import EFFECTS, WorkerPool
+from solver import EFFECTS, executor
 
 RULE = Rule(
     prior_nothing=NOTHING,
@@ -86,6 +86,8 @@ class DiagnoseOrder:
     notes: str = ""
     record: Path | None = None
     """New file for the answer as a recording."""
+    scheduler: str = ""
+    """Address of a Dask scheduler whose workers pour; "" for processes of this machine."""
 
 
 def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> DiagnosisResult:
@@ -130,7 +132,7 @@ def _run(
         stack.callback(progress.close)
         store = Store(path)
         stack.callback(store.close)
-        pool = stack.enter_context(WorkerPool(order.threads))
+        pool = stack.enter_context(executor(order.threads, order.scheduler))
         found = run_diagnosis(
             measurement, store, pool.run_queue, names, budget, progress.stage, progress.pour, order.seed, follow_up
         )

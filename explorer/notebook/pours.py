@@ -307,7 +307,7 @@ def sweep(
     """
     from doe.pour_runner import PourRunner
     from doe.run_records import Setting
-    from solver import WorkerPool
+    from solver import executor
 
     scene = load(source)
     given = _observed(scene)
@@ -335,7 +335,7 @@ def sweep(
             if bar:
                 bar.show(f"{total - left} of {total} pours", total - left, total)
 
-        crew = stack.enter_context(WorkerPool(workers)) if chosen() == "cpu" else None
+        crew = stack.enter_context(executor(workers)) if chosen() == "cpu" else None
         runner = PourRunner(
             scene, kept, "sweep", 0, workers, on_run=ended, pours=crew.run_queue if crew else None, seeds=numbers
         )

@@ -17,7 +17,7 @@ from doe.store import Store, default_store
 from explorer.background.progress import PROGRESS, RunProgress, told_of_pauses
 from explorer.errors import CommandError
 from explorer.population.process import populations
-from solver import Scene, WorkerPool, observable_names
+from solver import Scene, executor, observable_names
 from solver.arch import chosen
 
 STAGE = "pours"
@@ -33,6 +33,8 @@ class PoursOrder:
     out: Path | None = None
     store: Path | None = None
     threads: int | None = None
+    scheduler: str = ""
+    """Address of a Dask scheduler whose workers pour; "" for processes of this machine."""
 
 
 def pour_more(order: PoursOrder, say: Callable[[str], None]) -> tuple[Population, ...]:
@@ -63,7 +65,7 @@ def pour_more(order: PoursOrder, say: Callable[[str], None]) -> tuple[Population
                 progress.run(stage, run, remaining)
 
         workers = min(order.threads or os.cpu_count() or 1, order.pours)
-        pool = stack.enter_context(WorkerPool(workers)) if chosen() == "cpu" else None
+        pool = stack.enter_context(executor(workers, order.scheduler)) if chosen() == "cpu" else None
         pours = pool.run_queue if pool else None
         name = order.scene.title
         runner = PourRunner(order.scene, store, name, 0, order.threads, on_run=ended, pours=pours, seeds=seeds)

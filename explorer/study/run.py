@@ -47,7 +47,7 @@ from explorer.report import write_report
 from explorer.report.photograph import PhotographResult
 from explorer.report.set_up import set_up_of
 from explorer.study.process import PARTIAL, RESULT
-from solver import WorkerPool, pour_rig, unpacked
+from solver import executor, pour_rig, unpacked
 from solver.arch import chosen
 from solver.observables.made_up import estimator_bias
 from solver.observables.repose import AZIMUTHS_DEG, flank_feet, outline
@@ -83,6 +83,8 @@ class StudyOrder:
     """Leave out the stage that stops a study whose target no setting comes near."""
     piles: Path | None = None
     """New file for the answer as a recording; ``record``: folder for all pours of the verification."""
+    scheduler: str = ""
+    """Address of a Dask scheduler whose workers pour; "" for processes of this machine."""
 
 
 def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
@@ -140,7 +142,8 @@ def _run(
         stack.callback(store.close)
         recorder = stack.enter_context(_recorder(order.record)) if order.record else None
         # A recorder watches pours from within; all others run in processes of their own.
-        pool = stack.enter_context(WorkerPool(order.threads)) if recorder is None and chosen() == "cpu" else None
+        poured_apart = recorder is None and chosen() == "cpu"
+        pool = stack.enter_context(executor(order.threads, order.scheduler)) if poured_apart else None
         runner = PourRunner(
             study.scene,
             store,

@@ -13,6 +13,7 @@ import multiprocessing as mp
 import os
 import signal
 import sys
+import threading
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -22,7 +23,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from time import perf_counter
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -123,7 +124,7 @@ class WorkerPool:
             process.join()
         self._processes = []
 
-    def __enter__(self) -> WorkerPool:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -245,8 +246,10 @@ def script_left_alone() -> Iterator[None]:
 
 def begin_worker() -> None:
     """Make this a worker process: one CPU thread, and Ctrl-C left to the process in charge."""
-    # It reaches the whole group; the process in charge decides, and its end closes the pipe.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # It reaches the whole group; the process in charge decides, and its end closes the pipe. Only a program's first
+    # thread may set this, and only it is interrupted.
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     from solver import backend
 
     backend.init(threads=1)
