@@ -30,6 +30,7 @@ THIRD_PARTY_HOMES = {
 DOE_PARTS_THAT_MAY_USE_THE_SOLVER = {
     "doe/designs/__init__.py": "lists designs of other packages beside its own, by the registry of the solver",
     "doe/store.py": "keeps raw pours, and reads observables off them",
+    "doe/store_upkeep.py": "reads every raw pour of a store that is checked",
     "doe/run_records.py": "reads what the solver says of a run: whether its outcome is valid",
     "doe/pour_runner.py": "turns a row of a design into a batch of simulated worlds",
     "doe/studies/factors.py": "checks a factor's path and range against the declared parameters",
