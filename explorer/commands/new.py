@@ -51,7 +51,9 @@ def new(
     role: Literal["fit", "holdout"] | None = typer.Option(
         None, help="New measurement: of the condition; proposed if not given."
     ),
-    photo: list[Path] = typer.Option([], metavar="FILE", help="New measurement: photograph of the next pour."),
+    photo: list[str] = typer.Option(
+        [], metavar="FILE", help="New measurement: photograph of the next pour's pile, or a shipped one's name."
+    ),
     scale: float | None = typer.Option(None, metavar="MM_PER_PX", help="New measurement: pixel of the photographs."),
     angles: str | None = typer.Option(
         None, metavar="A,B,…|FILE.csv[:COLUMN]", help="New measurement: angles in degrees, one for each pour."
@@ -111,12 +113,14 @@ def new(
         from explorer.measured.folder import NewCondition, write_condition
         from explorer.measured.readings import Brought
         from explorer.tables.measurement import check_result, check_text
+        from solver.assets import asset_path
 
         if scale is not None and not 0.0 < scale < float("inf"):
             raise CommandError(f"--scale {scale:g} mm/px: must be positive and finite")
         asked = NewCondition(condition, role, study, material, tuple(set_), tuple(uncertainty))
         pixel = None if scale is None else 1e-3 * scale
-        brought = Brought(tuple(photo), pixel, angles, tuple(balance), tuple(starts), lag, tuple(scan), scan_unit, drum)
+        photographs = tuple(asset_path("photographs", one) for one in photo)
+        brought = Brought(photographs, pixel, angles, tuple(balance), tuple(starts), lag, tuple(scan), scan_unit, drum)
         found = write_condition(out / name, asked, brought)
         if json:
             plain = {"written": list(map(str, found.files)), "told": list(found.told), "proposal": found.proposal}

@@ -99,7 +99,7 @@ def _begun(folder: Path, asked: NewCondition, brought: Brought) -> WrittenCondit
         material = copied_material(named, file.parent if file else Path(), made)
         base = material_scene(material, made)
         entry = _entry(base, scene, asked, asked.role or "fit", found, brought)
-        top = {"format": 1, "title": folder.name, "material": material}
+        top = {"format": 1, "title": folder.resolve().name, "material": material}
         text = measurement_toml(top, {"parameters": free, "uncertainty": _uncertainty(asked)}, entry)
         about = OF_STUDY if file else ASSUMED
         _write_data(made, asked.name, found)
@@ -123,9 +123,10 @@ def _added(folder: Path, asked: NewCondition, brought: Brought) -> WrittenCondit
         raise CommandError(f"--condition {asked.name}: is there already; allowed: a name other than {', '.join(names)}")
     scene = _set(before.conditions[0].scene, asked)
     found = read_brought(brought, scene)
-    apart = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.absolute().parent))
+    # Beside the folder, so that what its files name relative to it is found.
+    staged = Path(tempfile.mkdtemp(prefix=".measurement-", dir=folder.resolve().parent))
     try:
-        staged = Path(shutil.copytree(folder, apart / folder.name))
+        shutil.copytree(folder, staged, dirs_exist_ok=True)
         free = [parameter.path for parameter in before.parameters]
         entry = _entry(before.scene, scene, asked, asked.role or "fit", found, brought, free)
         text = (
@@ -147,7 +148,7 @@ def _added(folder: Path, asked: NewCondition, brought: Brought) -> WrittenCondit
             place.parent.mkdir(exist_ok=True)
             file.replace(place)
     finally:
-        shutil.rmtree(apart, ignore_errors=True)
+        shutil.rmtree(staged, ignore_errors=True)
     told = [*found.told, *_unstated(scene, measurement, asked.name)]
     told += [
         f"{asked.name} has the set-up of {one.name}: it is another sample of that, and no other condition"
@@ -243,7 +244,7 @@ def _unstated(scene: Scene, measurement: Measurement, name: str) -> list[str]:
 
 def _heading(folder: Path) -> str:
     return (
-        f"# {folder.name}: measured data, begun by `explorer new measurement`. SI, angles in degrees.\n"
+        f"# {folder.resolve().name}: measured data, begun by `explorer new measurement`. SI, angles in degrees.\n"
         "# `explorer measurements check` says what they can tell, `explorer diagnose` what the material lacks.\n"
     )
 

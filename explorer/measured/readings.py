@@ -101,6 +101,8 @@ def read_brought(brought: Brought, scene: Scene) -> Readings:
     """
     found = Readings(photographs=brought.photographs, scans=brought.scans)
     given = observable_names(scene)
+    if brought.pixel is not None and not brought.photographs:
+        raise CommandError("--scale: belongs to --photo")
     if brought.photographs:
         _check("--photo", any(name in given for name in ANGLES[1:]), scene)
         _photographs(brought, found)
@@ -123,7 +125,8 @@ def read_brought(brought: Brought, scene: Scene) -> Readings:
         _check("--drum", DYNAMIC in given, scene)
         _drum(brought.drum, scene, found)
     if not found.rows:
-        raise CommandError("nothing was measured: give --photo, --angles, --balance, --scan or --drum")
+        said = "; ".join(found.told) or "give --photo, --angles, --balance, --scan or --drum"
+        raise CommandError(f"nothing was measured: {said}")
     return found
 
 
@@ -203,6 +206,8 @@ def _balances(brought: Brought, scene: Scene, found: Readings) -> None:
                 "the mass, such as --set rig.mass=30g"
             )
         found.told.append(curve.line(poured, brought.lag))
+        if math.isnan(curve.share_time(0.9, poured)):
+            found.told.append(f"{curve.name}: less than 90 % of it passed, so that it has no t90 and no duration")
     times = {name: [curve.share_time(share, poured) for curve in curves] for name, share in SHARES.items()}
     found.add(FLOWED, [b - a for a, b in zip(times["discharge_t10_s"], times["discharge_t90_s"], strict=True)])
     names = ", ".join(file.name for file in brought.balances)
