@@ -110,9 +110,9 @@ def new(
         raise CommandError(f"--from-{next(iter(given))}: allowed without --like, --part and another --from-…")
     if kind == StarterKind.MEASUREMENT:
         from explorer.files.run_folder import json_text
-        from explorer.measured.folder import NewCondition, write_condition
+        from explorer.measured.folder import NewCondition, write_condition, written_text
         from explorer.measured.readings import Brought
-        from explorer.tables.measurement import check_result, check_text
+        from explorer.tables.measurement import check_result
         from solver.assets import asset_path
 
         if scale is not None and not 0.0 < scale < float("inf"):
@@ -126,11 +126,7 @@ def new(
             plain = {"written": list(map(str, found.files)), "told": list(found.told), "proposal": found.proposal}
             typer.echo(json_text(plain | check_result(found.measurement)))
             return
-        for path in found.files:
-            typer.echo(f"wrote {path}")
-        for line in found.told:
-            typer.echo(f"note: {line}")
-        typer.echo(f"\n{check_text(found.measurement)}\n\n{found.proposal}")
+        typer.echo(written_text(found))
         typer.echo(f"try it: explorer {shlex.join(['diagnose', str(out / name)])}")
         return
     if given:

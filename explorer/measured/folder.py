@@ -37,6 +37,7 @@ from explorer.scene.file import material_scene, study_path, with_settings
 from explorer.scene.source import differences
 from explorer.scene.starter_files import SPAN, check_name, factor_paths
 from explorer.scene.text import toml_key, toml_value
+from explorer.tables.measurement import check_text
 from solver import Scene, asset_path, parameters, pour_rig, read_toml, value
 
 FIRST = "A"
@@ -77,13 +78,24 @@ class WrittenCondition:
     proposal: str
 
 
+def has_data(folder: Path) -> bool:
+    """Whether ``folder`` is one of measured data, to which a condition is added."""
+    return (folder / FILE).exists()
+
+
+def written_text(found: WrittenCondition) -> str:
+    """What was written, what was read of it, and what all the data can tell."""
+    lines = [*(f"wrote {path}" for path in found.files), *(f"note: {line}" for line in found.told)]
+    return "\n".join(lines) + f"\n\n{check_text(found.measurement)}\n\n{found.proposal}"
+
+
 def write_condition(folder: Path, asked: NewCondition, brought: Brought) -> WrittenCondition:
     """Write ``brought`` into the new ``folder``, or as one more condition into a folder of measured data.
 
     Raises CommandError, MeasurementError or another ValueError of this program in one line, with nothing changed.
     """
     check_name(asked.name)
-    return (_added if (folder / FILE).exists() else _begun)(folder, asked, brought)
+    return (_added if has_data(folder) else _begun)(folder, asked, brought)
 
 
 def _begun(folder: Path, asked: NewCondition, brought: Brought) -> WrittenCondition:
