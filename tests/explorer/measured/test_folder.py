@@ -199,7 +199,7 @@ def test_a_drum_s_sheet_is_read_as_the_laboratory_does(tmp_path):
     drum[-3] = "rig.speed_rpm=20"
     assert "a Froude number of" in refused(explorer("new", "measurement", tmp_path / "b", *drum))
     assert "--photo: rotating_drum gives dynamic_angle_deg" in refused(
-        explorer("new", "measurement", tmp_path / "b", *drum[:2], "--set", rig[0], "--photo", "x.jpg")
+        explorer("new", "measurement", tmp_path / "b", *drum[:2], "--set", rig[0], "--photo", "cone_25_30")
     )
 
 
