@@ -112,10 +112,14 @@ class MeasuredDataPanel(Panel):
 
     def _save(self) -> None:
         folder = self._uploads / check_name(str(self._set.value).strip())
+        changes = tuple(str(self._changes.value).split())
+        if any(change.startswith("rig.mesh") for change in changes):
+            # A browser names no file of this machine.
+            raise CommandError("Set-up: rig.mesh: allowed: the study's own; another goes by the command line")
         asked = NewCondition(
             name=str(self._condition.value).strip(),
             study=None if has_data(folder) else str(self._study),
-            settings=tuple(str(self._changes.value).split()),
+            settings=changes,
             uncertainty=tuple(str(self._spread.value).split()),
         )
         brought = self._brought()

@@ -285,6 +285,17 @@ def test_a_folder_with_data_changes_as_a_whole_or_not_at_all(material, tmp_path)
     assert line.endswith("belong to `new measurement`")
 
 
+def test_what_lies_beside_the_folder_is_found_while_a_condition_is_added(material, tmp_path):
+    folder = tmp_path / "data"
+    new(folder, "--material", material, "--angles", "24,25")
+    (folder / "beads.toml").unlink()
+    file = folder / "measurement.toml"
+    file.write_text(file.read_text(encoding="utf-8").replace('"beads.toml"', '"../beads.toml"'), encoding="utf-8")
+    new(folder, "--condition", "B", "--angles", "22,23", "--set", "insertion.rate=0.1")
+    assert [one.name for one in load_measurement(folder).conditions] == ["A", "B"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["beads.toml", "data"]
+
+
 def test_plain_data(material, tmp_path):
     found = json.loads(new(tmp_path / "data", "--material", material, "--angles", "24,25", "--json"))
     assert found["conditions"][0]["observations"][0]["values"] == [24.0, 25.0]

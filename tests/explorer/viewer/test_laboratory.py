@@ -371,7 +371,9 @@ def test_measured_data_that_do_not_fit_are_refused_in_one_line(bench):
     assert "a file of them goes by the command line" in bench.do(panel._save)
     panel._angles.value, panel._set.value = "24,25", "../lot"
     assert "letters, digits" in bench.do(panel._save)
-    panel._set.value, panel._lag.value = "lot", "long"
+    panel._set.value, panel._changes.value = "lot", "rig.mass=12g rig.mesh=/etc/passwd"
+    assert "rig.mesh: allowed: the study's own" in bench.do(panel._save)
+    panel._changes.value, panel._lag.value = "", "long"
     assert "Lag of the balance 'long'" in bench.do(panel._save)
     event(panel.uploads[PHOTOGRAPHS], UploadedFile("a.jpg", b"no picture"))
     finished(bench.actions, bench.background)
