@@ -33,6 +33,8 @@ from explorer.design.text import analysis_text, plan_text
 from explorer.files.run_folder import json_text
 from explorer.laboratory.part import part_table
 from explorer.laboratory.run import LabOrder, analysed, part_file
+from explorer.measured.folder import NewCondition, write_condition, written_text
+from explorer.measured.readings import Brought
 from explorer.photograph.annotated import sheet
 from explorer.photograph.run import MeasuredPhotographs, MeasureOrder, measure_order, outline_text, run_measure
 from explorer.photograph.target import PhotographedTarget, check_targets, keep_target
@@ -197,6 +199,38 @@ def measure_words(read: PhotographReading) -> list[str]:
     words = ["measure", read.photo]
     for option, length in (("--scale", read.ruler.scale_mm), ("--reference-length", read.ruler.reference_mm)):
         words += [] if length is None else [option, f"{length:g}"]
+    return words
+
+
+def measured_data_result(folder: Path, asked: NewCondition, brought: Brought) -> CommandResult:
+    """`explorer new measurement`: the condition ``asked`` for in ``folder``, and what the data can tell.
+
+    Raises what :func:`explorer.measured.folder.write_condition` does, with nothing changed.
+    """
+    words = ["explorer", *measured_data_words(folder, asked, brought)]
+    found = write_condition(folder, asked, brought)
+    return CommandResult(written_text(found), shlex.join(words), note=f"In the list of Diagnose: {folder.name}.")
+
+
+def measured_data_words(folder: Path, asked: NewCondition, brought: Brought) -> list[str]:
+    """The command line that makes the same of the same files, without the program's name."""
+    words = ["new", "measurement", folder.name, "--out", str(folder.parent), "--condition", asked.name]
+    for option, given in (
+        ("--study", [asked.study]),
+        ("--material", [asked.material]),
+        ("--set", asked.settings),
+        ("--uncertainty", asked.uncertainty),
+        ("--photo", brought.photographs),
+        ("--scale", [None if brought.pixel is None else f"{1e3 * brought.pixel:g}"]),
+        ("--angles", [brought.angles]),
+        ("--balance", brought.balances),
+        ("--starts", brought.starts),
+        ("--lag", [brought.lag]),
+        ("--scan", brought.scans),
+        ("--scan-unit", [brought.scan_unit] if brought.scans else []),
+        ("--drum", [brought.drum]),
+    ):
+        words += [word for one in given if one is not None for word in (option, str(one))]
     return words
 
 

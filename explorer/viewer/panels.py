@@ -6,6 +6,7 @@ from explorer.viewer.laboratory.audit_panel import AuditPanel
 from explorer.viewer.laboratory.bench_panel import BenchPanel
 from explorer.viewer.laboratory.design_panel import DesignPanel
 from explorer.viewer.laboratory.laboratory_panel import LaboratoryPanel
+from explorer.viewer.laboratory.measured_data_panel import MeasuredDataPanel
 from explorer.viewer.laboratory.photograph_panel import PhotographPanel
 from explorer.viewer.laboratory.rig_panel import RigPanel
 from explorer.viewer.look.look_panel import LookPanel
@@ -67,6 +68,7 @@ PANELS: Registry[type[Panel]] = Registry(
         BenchPanel,
         RigPanel,
         PhotographPanel,
+        MeasuredDataPanel,
         DesignPanel,
         AuditPanel,
         ReportsPanel,

@@ -1,15 +1,22 @@
 """The tab "Laboratory": a press shows the answer, uploads are offered and kept, what is wrong is one line."""
 
+import html
 import io
+import re
+import shlex
 import zipfile
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from viser import UploadedFile
 
 from doe.designs import DESIGNS
 from doe.laboratory import TESTS
 from doe.laboratory.analysis import template_of
+from doe.measurement import load_measurement
+from explorer.files.uploads import kept_measurements
 from explorer.laboratory.command_results import CommandResult, template_file
 from explorer.scene.source import material_source
 from explorer.viewer.actions import Actions
@@ -19,11 +26,15 @@ from explorer.viewer.laboratory.bench_panel import BenchPanel
 from explorer.viewer.laboratory.design_panel import DesignPanel
 from explorer.viewer.laboratory.inputs import positive
 from explorer.viewer.laboratory.laboratory_panel import LaboratoryPanel
+from explorer.viewer.laboratory.measured_data_panel import BALANCES, NOTHING, PHOTOGRAPHS, MeasuredDataPanel
 from explorer.viewer.laboratory.photograph_panel import PhotographPanel
 from explorer.viewer.laboratory.rig_panel import RigPanel
 from explorer.viewer.panel import Now
+from explorer.viewer.study.diagnosis_panel import DiagnosisPanel
 from explorer.viewer.study.reports_panel import NONE, ReportsPanel
 from solver.assets import asset_path
+from tests.explorer.command_line import explorer
+from tests.explorer.measured.test_balance import BEGINS, MASS, steady, write
 from tests.explorer.viewer.page_session import PageSession, event, finished, page_context
 
 
@@ -37,6 +48,7 @@ class Bench:
         self.background = page.bench_work
         self.bench, self.rig, self.photograph = BenchPanel(page), RigPanel(page), PhotographPanel(page)
         self.design, self.audit, self.reports = DesignPanel(page), AuditPanel(page), ReportsPanel(page)
+        self.data = MeasuredDataPanel(page)
         self.page = page
 
     def do(self, act):
@@ -316,3 +328,58 @@ def test_reports_of_the_laboratory_and_of_commands_are_in_the_room_of_reports(be
     (own / "audit_2" / "report.html").write_text("<p>an audit</p>")
     project = replace(bench.page.project, folder=own)
     assert [one.name for one in project.reports] == ["audit_2", folder.name]
+
+
+def test_measured_data_become_a_choice_of_the_diagnosis(bench, tmp_path):
+    """Angles, then a balance's curves of another set-up: the folder is that of the command line that is shown."""
+    panel, uploads = bench.data, bench.page.uploads
+    panel._set.value, panel._angles.value = "lot_7", "24.1, 25.0, 26.2"
+    panel._changes.value = "rig.outlet_height=60mm"
+    assert bench.do(panel._save) == ""
+    assert kept_measurements(uploads) == {"lot_7": uploads / "lot_7"}
+    (first,) = load_measurement(uploads / "lot_7").fit
+    assert first.offered["angle_of_repose_deg"].values.tolist() == [24.1, 25.0, 26.2]
+    shown = html.unescape(text_of(panel.view))
+    assert "role: A is fitted" in shown
+    assert "In the list of Diagnose: lot_7." in shown
+    assert "lot_7" in DiagnosisPanel._offered(SimpleNamespace(_shipped=(), _uploads=uploads))
+    # The same again by the command line.
+    command = re.search(r"(explorer new measurement .*?)</code>", shown)[1]
+    words = shlex.split(command)[1:]
+    words[words.index("--out") + 1] = str(tmp_path / "again")
+    assert explorer(*words).exit_code == 0
+    again = (tmp_path / "again/lot_7/measurement.toml").read_text(encoding="utf-8")
+    assert again == (uploads / "lot_7/measurement.toml").read_text(encoding="utf-8")
+    panel._condition.value, panel._angles.value, panel._starts.value = "B", "", f"{BEGINS}, {BEGINS}"
+    panel._changes.value = f"rig.mass={MASS}"
+    time = np.arange(0.0, 8.0, 0.05)
+    for k in range(2):
+        content = write(tmp_path / "b.csv", time, steady(time) + 1e-6 * k * time).read_bytes()
+        event(panel.uploads[BALANCES], UploadedFile(f"b{k}.csv", content))
+        finished(bench.actions, bench.background)
+    assert panel._kept.content.count(".csv") == 2
+    assert bench.do(panel._save) == ""
+    measurement = load_measurement(uploads / "lot_7")
+    assert [(one.name, one.role) for one in measurement.conditions] == [("A", "holdout"), ("B", "fit")]
+    assert NOTHING in panel._kept.content
+
+
+def test_measured_data_that_do_not_fit_are_refused_in_one_line(bench):
+    panel, uploads = bench.data, bench.page.uploads
+    assert "nothing was measured: give --photo" in bench.do(panel._save)
+    panel._angles.value = "angles.csv"
+    assert "a file of them goes by the command line" in bench.do(panel._save)
+    panel._angles.value, panel._set.value = "24,25", "../lot"
+    assert "letters, digits" in bench.do(panel._save)
+    panel._set.value, panel._changes.value = "lot", "rig.mass=12g rig.mesh=/etc/passwd"
+    assert "rig.mesh: allowed: the study's own" in bench.do(panel._save)
+    panel._changes.value, panel._lag.value = "", "long"
+    assert "Lag of the balance 'long'" in bench.do(panel._save)
+    event(panel.uploads[PHOTOGRAPHS], UploadedFile("a.jpg", b"no picture"))
+    finished(bench.actions, bench.background)
+    panel._lag.value = ""
+    assert "a-" in bench.do(panel._save)
+    assert "a-" in panel._kept.content
+    bench.do(panel._forget)
+    assert NOTHING in panel._kept.content
+    assert kept_measurements(uploads) == {}
