@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from doe.analysis.analyse import DesignAnalysis, ResponseTarget, analyse_design
+from doe.analysis.analyse import DesignAnalysis, analyse_design, reduction_words
 from doe.analysis.mixture import MixtureOrder, fit_mixture
 from doe.analysis.models import ORDERS, Order
+from doe.analysis.named_factors import MOST_SOLVED, fit_named
+from doe.analysis.optimum import ResponseTarget
 from doe.analysis.steepest_ascent import Region
 from doe.analysis.surface_anova import FULL
 from doe.designs import DESIGNS, factor_letters
@@ -81,17 +83,15 @@ def run_analyse(order: AnalyseOrder) -> DesignResult:
 def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
     """The analysis of one response."""
     region = region_of(runs.factors)
-    named = [factor for factor in runs.factors if factor.levels]
-    if named and order.target is not None:
-        raise CommandError(
-            f"--target: {named[0].name} is no number, and has no settings between its levels; "
-            "allowed: the runs of one level in a sheet of their own"
-        )
     if _whole(runs, region):
         return _result(runs, order, _mixture(runs, region, order))
-    _refuse_dependent(runs, region, order.sheet)
     reference = np.array([factor.reference for factor in runs.factors])
     target = None if order.target is None else ResponseTarget(order.target, order.target_error, reference)
+    most_names = max(len(factor.levels) for factor in runs.factors)
+    if most_names > 2 or (most_names and target is not None):
+        found = _named(runs, region, order, target)
+        return _result(runs, order, replace(found, notes=(*found.notes, *_run_notes(runs, region, found))))
+    _refuse_dependent(runs, region, order.sheet)
     try:
         found = analyse_design(
             runs.coded,
@@ -163,6 +163,32 @@ def _mixture(runs: Runs, region: Region, order: AnalyseOrder) -> DesignAnalysis:
     return DesignAnalysis((), None, None, None, (note,), mixture=found)
 
 
+def _named(runs: Runs, region: Region, order: AnalyseOrder, target: ResponseTarget | None) -> DesignAnalysis:
+    """The model of factors that are names, beside those that are numbers."""
+    try:
+        found = fit_named(
+            runs.coded,
+            runs.responses,
+            region,
+            [factor.levels for factor in runs.factors],
+            _order(runs, order),
+            _symbols(runs, order.terms),
+            target,
+            runs.blocks,
+            None if order.reduction is None else order.reduction.value,
+        )
+    except StatisticsError as error:
+        raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
+    notes = [] if found.reduced is None else [reduction_words(found.reduced)]
+    numbers = sum(not names for names in found.levels)
+    if target is not None and numbers > MOST_SOLVED:
+        notes.append(
+            f"The settings that give a target are searched for up to {MOST_SOLVED} numbers, not {numbers}: analyse the "
+            "factors that act alone."
+        )
+    return DesignAnalysis((), None, None, None, tuple(notes), named=found)
+
+
 def _refuse_dependent(runs: Runs, region: Region, sheet: str) -> None:
     """Raise CommandError where the levels of the valid runs do not tell the factors apart, and name those."""
     valid = ~np.isnan(runs.responses).all(axis=1)
@@ -197,7 +223,7 @@ def _run_notes(runs: Runs, region: Region, found: DesignAnalysis) -> list[str]:
     row, replicate = np.nonzero(~np.isnan(runs.responses))
     labels, notes = _labels(runs), []
     for factor in runs.factors:
-        if factor.levels:
+        if factor.levels and found.named is None:
             notes.append(f"{factor.name}: −1 is {factor.levels[0]}, +1 is {factor.levels[1]}.")
     for label, k in zip(labels, row, strict=True):
         for factor, coded, level in zip(runs.factors, runs.coded[k], region.natural(runs.coded[k]), strict=True):
@@ -211,6 +237,8 @@ def _run_notes(runs: Runs, region: Region, found: DesignAnalysis) -> list[str]:
             f"Not used: {', '.join(runs.grouping)}. A column that says on which day, from which batch or by whom a run "
             "was made goes into --block."
         )
+    if found.named is not None and runs.place.size:
+        notes += _drift(runs.place[row, replicate], found.named.observed - found.named.predicted)
     if found.model is not None:
         model = found.model.surface
         if runs.place.size:

@@ -200,13 +200,6 @@ def runs_of(sheet: Sheet, response: str, only: Sequence[str] = (), block: str = 
     Raises CommandError as `read_sheet` does.
     """
     factors = _kept(sheet, only)
-    for factor in factors:
-        if len(factor.levels) > 2:
-            others = ",".join(other.name for other in factors if len(other.levels) < 3)
-            raise CommandError(
-                f"{sheet.path}: {factor.name} has {len(factor.levels)} levels that are no numbers; "
-                f"allowed: its effect beside the model of the others, --only {others} --block {factor.name}"
-            )
     if block and (block not in sheet.columns or block == response or block in [factor.name for factor in factors]):
         offered = ", ".join(name for name in sheet.responses if name != response) or "none"
         raise CommandError(f"{sheet.path}: --block {block}: no column of blocks; the other columns are {offered}")

@@ -84,6 +84,17 @@ class DesignResult(Document):
     versions: dict[str, str | None]
     about: About = field(default_factory=About)
 
+    def levels_of(self, row: int) -> tuple[float | str, ...]:
+        """The levels of a row of the design: numbers in the units of their factors, and names."""
+        named = self.analysis.named
+        names = named.levels if named is not None else ((),) * len(self.factors)
+        return tuple(
+            own[round((coded + 1) / 2 * (len(own) - 1))]
+            if own
+            else (float(factor.low) + float(factor.high)) / 2 + (float(factor.high) - float(factor.low)) / 2 * coded
+            for factor, own, coded in zip(self.factors, names, self.coded[row].tolist(), strict=True)
+        )
+
     @property
     def effects(self) -> DrawnEffects | None:
         """The effects of a two-level design; None of any other."""

@@ -28,6 +28,7 @@ from explorer.report.design.model import (
     fit_summary,
     mixture_table,
 )
+from explorer.report.design.names import groups_table, means_table
 from explorer.report.design.sections import factor_table, in_short, settings_table, shape, target
 from explorer.report.sections.surface import anova_table, variance_table
 from explorer.tables.text_table import text_table
@@ -199,6 +200,9 @@ def analysis_text(result: DesignResult) -> str:
         parts += [_table(fit_summary(found)), _table(anova_table(found.model.anova))]
     if found.mixture is not None:
         parts += [_table(mixture_table(result, found.mixture)), _table(variance_table(found.mixture.rows))]
+    if found.named is not None:
+        parts += [_table(variance_table(found.named.rows, "")), _table(means_table(result, found.named))]
+        parts.append(_table(groups_table(result, found.named)))
     told: set[str] = set()
     for section in (in_short(result), diagnostics(result), shape(result), target(result)):
         if section is not None:

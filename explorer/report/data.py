@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from doe.analysis.named_factors import NamedFit
 from doe.analysis.surface_anova import SurfaceAnova
 from doe.studies.study_result import StudyResult
 from explorer.report.content import DataTable
@@ -30,7 +31,12 @@ def study_data(result: StudyResult) -> tuple[DataTable, ...]:
 
 def design_data(result: DesignResult) -> tuple[DataTable, ...]:
     """Runs with their levels, and the analysis of variance, in the units of the sheet."""
-    model, fitted = result.analysis.model, result.fitted
+    model, fitted, named = result.analysis.model, result.fitted, result.analysis.named
+    if named is not None:
+        fit = zip(result.labels, named.row_of_run, named.observed.tolist(), named.predicted.tolist(), strict=True)
+        header = ("run", *(one.factor for one in result.factors), result.response.name, "model")
+        rows = tuple((label, *result.levels_of(row), y, predicted) for label, row, y, predicted in fit)
+        return DataTable("runs", header, rows), _anova([(result.response.name, named)])
     if model is None or fitted is None:
         return ()
     header = ("run", *(f"{one.factor} [{one.unit or '1'}]" for one in result.factors))
@@ -116,7 +122,7 @@ def _parameters(result: StudyResult) -> DataTable:
     return DataTable("parameters", header, tuple(rows))
 
 
-def _anova(models: Iterable[tuple[str, SurfaceAnova]]) -> DataTable:
+def _anova(models: Iterable[tuple[str, SurfaceAnova | NamedFit]]) -> DataTable:
     header = ("response", "source", "sum_of_squares", "df", "mean_square", "f", "p")
     return DataTable(
         "anova", header, tuple((name, *vars(row).values()) for name, model in models for row in model.rows)

@@ -254,19 +254,33 @@ def test_a_factor_of_two_names_is_analysed_by_its_name(tmp_path, process):
                      result["analysis"]["model"]["surface"]["coefficients"], strict=True))  # fmt: skip
     assert [found[term] for term in ("intercept", "A", "B", "C")] == pytest.approx([10, 2, 0, 3], abs=0.02)
     assert "solvent: −1 is water, +1 is ethanol." in result["analysis"]["notes"]
-    assert "--target: solvent is no number" in refused(explorer("analyse", path, "--target", 12))
+    # With a target there is a setting of the numbers for each name.
+    named = analysed(path, "--target", 12)["analysis"]["named"]
+    for group, offset in zip(named["groups"], (-3, 3), strict=True):
+        assert group["setting"]["reached"] == (abs(12 - 10 - offset) <= 2)
     path.write_text(path.read_text(encoding="utf-8").replace("ethanol,", "Ethanol,", 1), encoding="utf-8")
     assert "column solvent: 'Ethanol'; allowed: water, ethanol" in refused(explorer("analyse", path))
 
 
-def test_a_factor_of_three_names_is_analysed_as_blocks(tmp_path, process):
+def test_a_factor_of_three_names_is_a_term_with_two_degrees_of_freedom_or_blocks(tmp_path, process):
     process.write_text(PROCESS + SOLVENT.replace('"ethanol"', '"ethanol", "oil"'), encoding="utf-8")
     path, said = made(tmp_path, "d-optimal", "--factors", process, "--model", "linear", "--runs", 12)
     assert "not told for a factor of three names" in said
-    fill(path, np.random.default_rng(1).standard_normal(12))
-    message = refused(explorer("analyse", path))
-    assert "solvent has 3 levels that are no numbers; allowed: " in message
-    assert "--only time,temperature --block solvent" in message
+    effect = {"water": 0.0, "ethanol": 2.0, "oil": -2.0}
+    lines = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    noise = 0.1 * np.random.default_rng(1).standard_normal(12)
+    fill(path, [10 + effect[cells[6]] + one for cells, one in zip(lines, noise, strict=True)])
+    named = analysed(path, "--model", "linear", "--target", 12)["analysis"]["named"]
+    assert {row["source"]: row["df"] for row in named["rows"]}["C"] == 2
+    assert [one["effect"] for one in named["means"]] == pytest.approx([0, 2, -2], abs=0.2)
+    assert [group["names"] for group in named["groups"]] == [["water"], ["ethanol"], ["oil"]]
+    said = explorer("analyse", path, "--model", "linear", "--target", 12, "--out", tmp_path / "found").stdout
+    assert "solvent: ethanol" in said
+    assert "Terms that act: C (p < 0.05" in said
+    report = (tmp_path / "found/report.md").read_text(encoding="utf-8")
+    assert "solvent: oil" in report
+    assert (tmp_path / "found/data/anova.csv").read_text(encoding="utf-8").count("\n") == 1 + len(named["rows"])
+    assert "C is a factor of names, which has no square" in refused(explorer("analyse", path, "--terms", "A,C^2"))
     result = analysed(path, "--only", "time,temperature", "--block", "solvent")
     assert set(result["analysis"]["model"]["surface"]["block_names"]) == {"water", "ethanol", "oil"}
 
