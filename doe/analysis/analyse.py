@@ -34,6 +34,7 @@ from doe.analysis.models import (
 )
 from doe.analysis.named_factors import NamedFit
 from doe.analysis.optimum import Optimum, ResponseTarget, find_optimum
+from doe.analysis.random_groups import RandomFit
 from doe.analysis.replicates import row_moments
 from doe.analysis.screening import Screening, analyse_screening
 from doe.analysis.steepest_ascent import Region
@@ -88,9 +89,9 @@ class TargetIntervals(Record):
 @dataclass(frozen=True)
 class DesignAnalysis(Record):
     """What the runs of a design say. effects: None unless every level is low, high or (all factors) middle. model: None
-    where the runs leave no error for any model. notes: sentences that a reader must know. mixture, named: of parts that
-    add up to a whole, of factors that are names, instead of all others. at_target: None without an optimum. reduced:
-    None without a search for terms to drop.
+    where the runs leave no error for any model. notes: sentences that a reader must know. at_target: None without an
+    optimum. reduced: None without a search for terms to drop. Instead of all others: mixture of parts that add up to a
+    whole, named of factors that are names, random with groups drawn at random.
     """
 
     fits: tuple[OrderFit, ...]
@@ -102,10 +103,11 @@ class DesignAnalysis(Record):
     at_target: TargetIntervals | None = None
     reduced: ReducedModel | None = None
     named: NamedFit | None = None
+    random: RandomFit | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return every field; those that not every analysis has only where it has them."""
-        own = {name for name in ("mixture", "at_target", "reduced", "named") if getattr(self, name) is None}
+        own = {name for name in ("mixture", "at_target", "reduced", "named", "random") if getattr(self, name) is None}
         return {name: value for name, value in super().to_dict().items() if name not in own}
 
 

@@ -262,14 +262,14 @@ def fit_named(
     )
 
 
-def _orders(levels: Sequence[int]) -> dict[Order, tuple[str, ...]]:
-    """The terms of each order, once each."""
+def orders_of(levels: Sequence[int]) -> dict[Order, tuple[str, ...]]:
+    """Return the terms of each order."""
     return {one: tuple(dict.fromkeys(map(term_of, model_terms(levels, one).names[1:]))) for one in ORDERS}
 
 
 def _terms(runs: _Runs, order: Order | None) -> tuple[str, ...]:
     """The terms of an order, or of the highest that the runs bear."""
-    orders = _orders(runs.levels)
+    orders = orders_of(runs.levels)
     if order is not None:
         return orders[order]
     able = [terms for terms in orders.values() if runs.df(terms) >= 1]
@@ -314,24 +314,35 @@ def _rows(runs: _Runs, terms: tuple[str, ...], found: Any, total: float, mse: fl
     )
 
 
+def mean_contrasts(
+    levels: Sequence[tuple[str, ...]], terms: Sequence[str], columns: Terms, letters: Sequence[str]
+) -> list[tuple[str, str, FloatArray, FloatArray]]:
+    """Return factor, name, and the contrasts of the columns that give its mean and its effect, of every name.
+
+    Contrasts sum to zero, and so does what is averaged: only the columns of the factor alone are left.
+    """
+    found = []
+    for factor, names in enumerate(levels):
+        if names and letters[factor] in terms:
+            points = np.zeros((len(names), len(levels)))
+            points[:, factor] = codes(len(names))
+            own = columns.matrix(points) * [term_of(name) == letters[factor] for name in columns.names]
+            intercept = np.arange(own.shape[1]) == 0
+            found += [(letters[factor], name, one + intercept, one) for name, one in zip(names, own, strict=True)]
+    return found
+
+
 def _means(
     fit: NamedFit, columns: Terms, coefficients: FloatArray, covariance: FloatArray, letters: Sequence[str]
 ) -> tuple[NameMean, ...]:
-    """Contrasts sum to zero, and so does what is averaged: only the columns of the factor alone are left."""
+    """The means of the names with their intervals."""
     t = float(stats.t.ppf(0.975, fit.df_residual))
     found = []
-    for factor, names in enumerate(fit.levels):
-        if not names or letters[factor] not in fit.terms:
-            continue
-        points = np.zeros((len(names), len(fit.levels)))
-        points[:, factor] = codes(len(names))
-        own = columns.matrix(points) * [term_of(name) == letters[factor] for name in columns.names]
-        for name, effect in zip(names, own, strict=True):
-            at = effect + (np.arange(len(effect)) == 0)
-            mean, half = float(at @ coefficients), t * math.sqrt(at @ covariance @ at)
-            size, error = float(effect @ coefficients), math.sqrt(effect @ covariance @ effect)
-            p = 2 * float(stats.t.sf(abs(ratio(abs(size), error)), fit.df_residual))
-            found.append(NameMean(letters[factor], name, mean, mean - half, mean + half, size, error, p))
+    for factor, name, at, effect in mean_contrasts(fit.levels, fit.terms, columns, letters):
+        mean, half = float(at @ coefficients), t * math.sqrt(at @ covariance @ at)
+        size, error = float(effect @ coefficients), math.sqrt(effect @ covariance @ effect)
+        p = 2 * float(stats.t.sf(ratio(abs(size), error), fit.df_residual))
+        found.append(NameMean(factor, name, mean, mean - half, mean + half, size, error, p))
     return tuple(found)
 
 

@@ -21,6 +21,9 @@ def analyse(
     ),
     only: str = typer.Option("", metavar="NAME,…", help="Only these factors; the others count as scatter."),
     block: str = typer.Option("", metavar="NAME", help="Column of days, batches or operators: a fixed effect each."),
+    random: str = typer.Option(
+        "", metavar="NAME", help="Column of groups drawn at random (days, whole plots, seeds): a variance component."
+    ),
     factors: str | None = typer.Option(None, metavar="FILE", help="Factors file, for a sheet that declares none."),
     out: Path | None = typer.Option(
         None, metavar="DIR", help="New folder for result.json, the report, its figures and data."
@@ -50,6 +53,7 @@ def analyse(
         terms=_names(terms),
         only=_names(only),
         block=block,
+        random=random,
         reduction=reduce,
         out=out,
         author=author,

@@ -16,7 +16,9 @@ from doe.analysis.mixture import MixtureOrder, fit_mixture
 from doe.analysis.models import ORDERS, Order
 from doe.analysis.named_factors import MOST_SOLVED, fit_named
 from doe.analysis.optimum import ResponseTarget
+from doe.analysis.random_groups import fit_random
 from doe.analysis.steepest_ascent import Region
+from doe.analysis.surface import Blocks
 from doe.analysis.surface_anova import FULL
 from doe.designs import DESIGNS, factor_letters
 from doe.errors import StatisticsError
@@ -57,6 +59,8 @@ class AnalyseOrder:
     only: tuple[str, ...] = ()
     block: str = ""
     """Column of the block in which each run was made."""
+    random: str = ""
+    """Column of the group, drawn at random, in which each run was made."""
     reduction: Reduction | None = None
     out: Path | None = field(default=None)
     author: str = ""
@@ -71,8 +75,12 @@ def run_analyse(order: AnalyseOrder) -> DesignResult:
     path = asset_path("runs", order.sheet)
     factors = read_factors(asset_path("designs", order.factors)).factors if order.factors else ()
     sheet = read_sheet(path, factors)
-    responses = [name for name in sheet.responses if name not in (order.block, BLOCK) and not sheet.is_words(name)]
-    runs = runs_of(sheet, order.response or _only_response(sheet.path, responses), order.only, order.block)
+    responses = [
+        name for name in sheet.responses if name not in (order.block, order.random, BLOCK) and not sheet.is_words(name)
+    ]
+    runs = runs_of(
+        sheet, order.response or _only_response(sheet.path, responses), order.only, order.block, order.random
+    )
     result = analyse_runs(runs, order)
     if order.out is not None:
         with appearing(order.out) as folder:
@@ -83,6 +91,9 @@ def run_analyse(order: AnalyseOrder) -> DesignResult:
 def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
     """The analysis of one response."""
     region = region_of(runs.factors)
+    if runs.groups is not None:
+        found = _random(runs, region, order, runs.groups)
+        return _result(runs, order, replace(found, notes=tuple(_run_notes(runs, region, found))))
     if _whole(runs, region):
         return _result(runs, order, _mixture(runs, region, order))
     reference = np.array([factor.reference for factor in runs.factors])
@@ -163,6 +174,27 @@ def _mixture(runs: Runs, region: Region, order: AnalyseOrder) -> DesignAnalysis:
     return DesignAnalysis((), None, None, None, (note,), mixture=found)
 
 
+def _random(runs: Runs, region: Region, order: AnalyseOrder, groups: Blocks) -> DesignAnalysis:
+    """The model with groups that are drawn at random; raises CommandError for what is not for one."""
+    for option, given in {"--target": order.target is not None, "--reduce": order.reduction}.items():
+        if given:
+            raise CommandError(f"{option}: is not for --random {order.random}; allowed: --block {order.random}")
+    try:
+        found = fit_random(
+            runs.coded,
+            runs.responses,
+            region,
+            [factor.levels for factor in runs.factors],
+            groups,
+            _order(runs, order),
+            _symbols(runs, order.terms),
+            runs.blocks,
+        )
+    except StatisticsError as error:
+        raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
+    return DesignAnalysis((), None, None, None, (), random=found)
+
+
 def _named(runs: Runs, region: Region, order: AnalyseOrder, target: ResponseTarget | None) -> DesignAnalysis:
     """The model of factors that are names, beside those that are numbers."""
     try:
@@ -223,7 +255,7 @@ def _run_notes(runs: Runs, region: Region, found: DesignAnalysis) -> list[str]:
     row, replicate = np.nonzero(~np.isnan(runs.responses))
     labels, notes = _labels(runs), []
     for factor in runs.factors:
-        if factor.levels and found.named is None:
+        if factor.levels and found.named is None and len(factor.levels) == 2:
             notes.append(f"{factor.name}: −1 is {factor.levels[0]}, +1 is {factor.levels[1]}.")
     for label, k in zip(labels, row, strict=True):
         for factor, coded, level in zip(runs.factors, runs.coded[k], region.natural(runs.coded[k]), strict=True):
@@ -232,7 +264,7 @@ def _run_notes(runs: Runs, region: Region, found: DesignAnalysis) -> list[str]:
                     f"{label}: {factor.name} is {level:.6g}, {abs(coded):.1f} half-widths from the middle of "
                     f"{factor.low:g} … {factor.high:g}: a slip? One such level decides the whole model."
                 )
-    if runs.grouping and runs.blocks is None:
+    if runs.grouping and runs.blocks is None and runs.groups is None:
         notes.append(
             f"Not used: {', '.join(runs.grouping)}. A column that says on which day, from which batch or by whom a run "
             "was made goes into --block."
@@ -367,6 +399,7 @@ def _command(order: AnalyseOrder) -> tuple[str, ...]:
         ("--terms", order.terms, ",".join),
         ("--only", order.only, ",".join),
         ("--block", order.block, str),
+        ("--random", order.random, str),
         ("--reduce", order.reduction, str),
     ]
     for option, value, write in options:

@@ -84,10 +84,15 @@ class DesignResult(Document):
     versions: dict[str, str | None]
     about: About = field(default_factory=About)
 
+    @property
+    def names(self) -> tuple[tuple[str, ...], ...]:
+        """The names of each factor, () of a number, in a model that tells them apart."""
+        found = self.analysis.named or self.analysis.random
+        return found.levels if found is not None else ((),) * len(self.factors)
+
     def levels_of(self, row: int) -> tuple[float | str, ...]:
         """The levels of a row of the design: numbers in the units of their factors, and names."""
-        named = self.analysis.named
-        names = named.levels if named is not None else ((),) * len(self.factors)
+        names = self.names
         return tuple(
             own[round((coded + 1) / 2 * (len(own) - 1))]
             if own

@@ -20,6 +20,7 @@ from explorer.design.factors_file import DesignFactor, FactorsFile, region_of
 from explorer.design.result import DesignResult
 from explorer.design.run_plan import RunPlan
 from explorer.report.content import Facts, Table
+from explorer.report.design.groups import components_table, estimates_table, tests_table
 from explorer.report.design.model import (
     curvature,
     diagnostics,
@@ -201,8 +202,13 @@ def analysis_text(result: DesignResult) -> str:
     if found.mixture is not None:
         parts += [_table(mixture_table(result, found.mixture)), _table(variance_table(found.mixture.rows))]
     if found.named is not None:
-        parts += [_table(variance_table(found.named.rows, "")), _table(means_table(result, found.named))]
+        parts += [_table(variance_table(found.named.rows, "")), _table(means_table(result, found.named.means))]
         parts.append(_table(groups_table(result, found.named)))
+    if found.random is not None:
+        parts += [_table(components_table(result, found.random)), _table(tests_table(found.random))]
+        parts.append(_table(estimates_table(found.random)))
+        if found.random.means:
+            parts.append(_table(means_table(result, found.random.means)))
     told: set[str] = set()
     for section in (in_short(result), diagnostics(result), shape(result), target(result)):
         if section is not None:

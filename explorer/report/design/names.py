@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
-from doe.analysis.named_factors import NamedFit, NameGroup
+from doe.analysis.named_factors import NamedFit, NameGroup, NameMean
 from explorer.design.result import DesignResult, SheetFactor
 from explorer.report.content import Block, Facts, Figure, Folded, Section, Spec, Table, Text
 from explorer.report.figures.style import FACTOR, axis, chart, error_bars, label, points
@@ -40,7 +41,7 @@ def names(result: DesignResult) -> Section | None:
     ]
     if found.means:
         caption = f"{n}. Means of the names with 95 % intervals (t)."
-        blocks += [Figure("names", name_chart(result, found), caption), means_table(result, found)]
+        blocks += [Figure("names", name_chart(result, found), caption), means_table(result, found.means)]
     blocks.append(groups_table(result, found))
     equations = [
         (enumeration(group.names), equation(group, numbers_of(result, found), result.response.path)[1])
@@ -79,7 +80,7 @@ def names_of(result: DesignResult, found: NamedFit) -> list[SheetFactor]:
     return [factor for factor, levels in zip(result.factors, found.levels, strict=True) if levels]
 
 
-def means_table(result: DesignResult, found: NamedFit) -> Table:
+def means_table(result: DesignResult, means: Sequence[NameMean]) -> Table:
     """Per name: its mean with the interval, and its effect."""
     response, title = result.response.path, {factor.name: factor.factor for factor in result.factors}
     rows = tuple(
@@ -92,7 +93,7 @@ def means_table(result: DesignResult, found: NamedFit) -> Table:
             number(one.standard_error),
             p_value(one.p),
         )
-        for one in found.means
+        for one in means
     )
     header = ("letter", "name", "mean", "95 %", "effect", "standard error", "p")
     return Table(header, rows, "Effect: the mean of a name less that of all names of the factor.")

@@ -16,6 +16,7 @@ from doe.stages.surface import OptimumResult
 from explorer.design.result import DesignResult
 from explorer.report.content import Banner, Block, Caution, Code, Facts, Figure, Section, Table, Text, Word
 from explorer.report.design.charts import ridge
+from explorer.report.design.groups import ACTS, group_facts, groups
 from explorer.report.design.model import blend_words, diagnostics, effects, mixture, model, units_of_factors
 from explorer.report.design.names import fit_facts, names, target_words
 from explorer.report.figures.model import cloud, ranges
@@ -231,6 +232,8 @@ def acting_words(result: DesignResult) -> str:
             if row.p < 0.05
             else f"no change by the blend is seen (p = {p_value(row.p)})"
         )
+    if found.random is not None:
+        return group_facts(result, found.random)[0][1]
     if found.named is not None:
         return terms_that_act(found.named.rows)
     return "no model could be fitted" if found.model is None else terms_that_act(found.model.anova.rows)
@@ -246,6 +249,8 @@ def _acting_names(result: DesignResult) -> list[str]:
         return [e.name for e in screening.effects if not e.is_dummy and abs(e.effect) > screening.lenth.margin]
     if found.mixture is not None:
         return [factor.factor for factor in result.factors] if found.mixture.rows[0].p < 0.05 else []
+    if found.random is not None:
+        return [one.source.replace("*", " × ").replace("^2", "²") for one in found.random.tests if one.p < ACTS]
     anova = found.model.anova if found.model is not None else found.named
     rows = [] if anova is None else [row for row in anova.rows if row.source not in WHOLE]
     return [row.source.replace("*", " × ").replace("^2", "²") for row in rows if row.p < 0.05]
@@ -293,6 +298,8 @@ def in_short(result: DesignResult) -> Section:
             ("R², adjusted, predicted", ", ".join(fixed(value, 4) for value in blends.shares_explained)),
             ("Scatter of one run", observed(response, blends.sigma)),
         ]
+    if found.random is not None:
+        facts += group_facts(result, found.random)
     if found.named is not None:
         facts += [("Terms that act", terms_that_act(found.named.rows)), *fit_facts(result, found.named)]
         if result.target is not None:
@@ -331,7 +338,6 @@ def terms_that_act(rows: Sequence[AnovaRow]) -> str:
 
 def factor_table(result: DesignResult) -> Table:
     """Letters, names and ranges of the factors."""
-    named = result.analysis.named
     rows = tuple(
         (factor.name, parameter_label(factor.path), enumeration(levels), MISSING, MISSING)
         if levels
@@ -342,7 +348,7 @@ def factor_table(result: DesignResult) -> Table:
             parameter_value(factor.path, factor.high),
             parameter_value(factor.path, factor.reference),
         )
-        for factor, levels in zip(result.factors, named.levels if named else [()] * len(result.factors), strict=True)
+        for factor, levels in zip(result.factors, result.names, strict=True)
     )
     return Table(("letter", "factor", "low (−1)", "high (+1)", "reference"), rows)
 
@@ -385,6 +391,7 @@ SECTIONS: tuple[Callable[[DesignResult], Section | None], ...] = (
     mixture,
     model,
     names,
+    groups,
     diagnostics,
     shape,
     all_runs,

@@ -285,6 +285,26 @@ def test_a_factor_of_three_names_is_a_term_with_two_degrees_of_freedom_or_blocks
     assert set(result["analysis"]["model"]["surface"]["block_names"]) == {"water", "ethanol", "oil"}
 
 
+def test_days_drawn_at_random_are_a_variance_component(tmp_path, process):
+    """Three days with every run each: y = 10 + 2 A + day, the days -4, 0 and 4 (variance 16)."""
+    path, _ = made(tmp_path, "factorial", "--factors", process, "--replicates", 3, "--blocks", 3)
+    cells = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    noise = 0.1 * np.random.default_rng(2).standard_normal(len(cells))
+    days = {"1": -4, "2": 0, "3": 4}
+    fill(path, [10 + 2 * (float(one[5]) - 85) / 5 + days[one[4]] + e for one, e in zip(cells, noise, strict=True)])
+    random = analysed(path, "--random", "block")["analysis"]["random"]
+    between, within = random["components"]
+    assert between["variance"] == pytest.approx(16, rel=0.1)
+    assert between["low"] < 16 < between["high"]
+    assert within["variance"] < 0.03
+    assert {one["source"]: one["p"] < 1e-6 for one in random["tests"]}["A"]
+    said = explorer("analyse", path, "--random", "block", "--out", tmp_path / "found").stdout
+    assert "between groups" in said
+    assert "Terms that act: A (p < 0.05" in said
+    assert "Satterthwaite" in (tmp_path / "found/report.md").read_text(encoding="utf-8")
+    assert (tmp_path / "found/data/tests.csv").read_text(encoding="utf-8").startswith("source,df,df_error,f,p")
+
+
 @pytest.mark.parametrize(
     "options, message",
     [

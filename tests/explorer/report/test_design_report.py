@@ -8,6 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
+from doe.analysis.surface import Blocks
 from doe.designs import box_behnken, central_composite, factorial, latin_hypercube, plackett_burman
 from explorer.design.analysis import AnalyseOrder, analyse_runs
 from explorer.design.factors_file import DesignFactor
@@ -56,7 +57,15 @@ def names():
     )
 
 
+def in_groups():
+    """Twelve groups of the runs of `names`, drawn at random."""
+    sheet = names()
+    of_run = (np.arange(36) % 12)[:, None]
+    return replace(sheet, groups=Blocks(tuple(f"day {k}" for k in range(12)), of_run))
+
+
 CASES = {
+    "random groups": (in_groups(), None),
     "names": (names(), 9.5),
     "names without a target": (names(), None),
     "target out of reach of all names": (names(), 99.0),
