@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from explorer.design.choices import ModelOrder, Reduction
+from explorer.design.choices import ModelOrder, Reduction, Surrogate
 
 
 def analyse(
@@ -18,6 +18,9 @@ def analyse(
     terms: str = typer.Option("", metavar="A,B,A*B,…", help="Instead of an order, the terms; what they need is added."),
     reduce: Reduction | None = typer.Option(
         None, help="Drop terms one by one, factors after their products: by AICc, or while p > 0.05."
+    ),
+    surrogate: Surrogate | None = typer.Option(
+        None, help="A Gaussian process beside the polynomial: which predicts better? --target is answered by it."
     ),
     only: str = typer.Option("", metavar="NAME,…", help="Only these factors; the others count as scatter."),
     block: str = typer.Option("", metavar="NAME", help="Column of days, batches or operators: a fixed effect each."),
@@ -55,6 +58,7 @@ def analyse(
         block=block,
         random=random,
         reduction=reduce,
+        surrogate=surrogate,
         out=out,
         author=author,
         notes=notes,

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.analysis.analyse import DesignAnalysis, analyse_design, reduction_words
+from doe.analysis.gaussian_process import fit_process, process_target
 from doe.analysis.mixture import MixtureOrder, fit_mixture
 from doe.analysis.models import ORDERS, Order
 from doe.analysis.named_factors import MOST_SOLVED, fit_named
@@ -22,7 +23,7 @@ from doe.analysis.surface import Blocks
 from doe.analysis.surface_anova import FULL
 from doe.designs import DESIGNS, factor_letters
 from doe.errors import StatisticsError
-from explorer.design.choices import ModelOrder, Reduction
+from explorer.design.choices import ModelOrder, Reduction, Surrogate
 from explorer.design.factors_file import read_factors, region_of
 from explorer.design.filled_sheet import Runs, read_sheet, runs_of
 from explorer.design.result import DesignResult, Response, RunCount, SheetFactor
@@ -62,6 +63,7 @@ class AnalyseOrder:
     random: str = ""
     """Column of the group, drawn at random, in which each run was made."""
     reduction: Reduction | None = None
+    surrogate: Surrogate | None = None
     out: Path | None = field(default=None)
     author: str = ""
     notes: str = ""
@@ -91,15 +93,17 @@ def run_analyse(order: AnalyseOrder) -> DesignResult:
 def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
     """The analysis of one response."""
     region = region_of(runs.factors)
+    if order.surrogate is not None:
+        _refuse_surrogate(runs, order)
     if runs.groups is not None:
         found = _random(runs, region, order, runs.groups)
         return _result(runs, order, replace(found, notes=tuple(_run_notes(runs, region, found))))
-    if _whole(runs, region):
+    if _whole(runs, region) and order.surrogate is None:
         return _result(runs, order, _mixture(runs, region, order))
     reference = np.array([factor.reference for factor in runs.factors])
     target = None if order.target is None else ResponseTarget(order.target, order.target_error, reference)
     most_names = max(len(factor.levels) for factor in runs.factors)
-    if most_names > 2 or (most_names and target is not None):
+    if most_names > 2 or (most_names and target is not None and order.surrogate is None):
         found = _named(runs, region, order, target)
         return _result(runs, order, replace(found, notes=(*found.notes, *_run_notes(runs, region, found))))
     _refuse_dependent(runs, region, order.sheet)
@@ -110,13 +114,30 @@ def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
             region,
             _order(runs, order),
             _symbols(runs, order.terms),
-            target,
+            target if order.surrogate is None else None,
             runs.blocks,
             None if order.reduction is None else order.reduction.value,
         )
+        if order.surrogate is not None:
+            process = fit_process(runs.coded, runs.responses, region)
+            answer = None if target is None else process_target(process, target)
+            found = replace(found, surrogate=process, surrogate_target=answer)
     except StatisticsError as error:
         raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
     return _result(runs, order, replace(found, notes=(*found.notes, *_run_notes(runs, region, found))))
+
+
+def _refuse_surrogate(runs: Runs, order: AnalyseOrder) -> None:
+    """A Gaussian process has no groups, and no distance between three names."""
+    for option, given in {"--block": runs.blocks, "--random": runs.groups}.items():
+        if given is not None:
+            raise CommandError(f"--surrogate {order.surrogate}: has no groups of runs; allowed: without {option}")
+    for factor in runs.factors:
+        if factor.levels:
+            others = ",".join(other.name for other in runs.factors if not other.levels)
+            raise CommandError(
+                f"--surrogate {order.surrogate}: {factor.name} is no number; allowed: factors that are, --only {others}"
+            )
 
 
 def _result(runs: Runs, order: AnalyseOrder, analysis: DesignAnalysis) -> DesignResult:
@@ -401,6 +422,7 @@ def _command(order: AnalyseOrder) -> tuple[str, ...]:
         ("--block", order.block, str),
         ("--random", order.random, str),
         ("--reduce", order.reduction, str),
+        ("--surrogate", order.surrogate, str),
     ]
     for option, value, write in options:
         if value is not None and value not in ("", ()):

@@ -31,6 +31,7 @@ from explorer.report.design.model import (
 )
 from explorer.report.design.names import groups_table, means_table
 from explorer.report.design.sections import factor_table, in_short, settings_table, shape, target
+from explorer.report.design.surrogate import errors_table, lengths_table, process_settings
 from explorer.report.sections.surface import anova_table, variance_table
 from explorer.tables.text_table import text_table
 from explorer.units import enumeration, number
@@ -209,6 +210,10 @@ def analysis_text(result: DesignResult) -> str:
         parts.append(_table(estimates_table(found.random)))
         if found.random.means:
             parts.append(_table(means_table(result, found.random.means)))
+    if found.surrogate is not None:
+        parts += [_table(errors_table(result, found.surrogate)), _table(lengths_table(result, found.surrogate))]
+    if found.surrogate_target is not None:
+        parts.append(_table(process_settings(result, found.surrogate_target)))
     told: set[str] = set()
     for section in (in_short(result), diagnostics(result), shape(result), target(result)):
         if section is not None:

@@ -19,6 +19,7 @@ from explorer.report.design.charts import ridge
 from explorer.report.design.groups import ACTS, group_facts, groups
 from explorer.report.design.model import blend_words, diagnostics, effects, mixture, model, units_of_factors
 from explorer.report.design.names import fit_facts, names, target_words
+from explorer.report.design.surrogate import better_words, surrogate, target_facts
 from explorer.report.figures.model import cloud, ranges
 from explorer.report.figures.surface import solutions
 from explorer.report.identified import GIVES_TARGET, cloud_caution, rule, settings
@@ -198,6 +199,12 @@ def banner(result: DesignResult) -> Banner:
             if open_
             else "Run the setting found, a few times, and compare.",
         )
+    if found.surrogate_target is not None:
+        words = target_facts(result, found.surrogate_target)[0][1]
+        if not found.surrogate_target.reached:
+            return Banner(Word.OUT_OF_REACH, "", f"By the process: {words}.", "Make runs beyond low … high.")
+        of = observed(response, found.surrogate_target.target)
+        return Banner(Word.TARGET_REACHED, of, f"By the process: {words}.", "Run the setting found, and compare.")
     if found.named is not None and result.target is not None and any(one.setting for one in found.named.groups):
         words = target_words(result, found.named)
         if not any(one.setting and one.setting.reached for one in found.named.groups):
@@ -298,6 +305,10 @@ def in_short(result: DesignResult) -> Section:
             ("R², adjusted, predicted", ", ".join(fixed(value, 4) for value in blends.shares_explained)),
             ("Scatter of one run", observed(response, blends.sigma)),
         ]
+    if found.surrogate is not None:
+        facts.append(("Predicts better", better_words(result)))
+    if found.surrogate_target is not None:
+        facts += target_facts(result, found.surrogate_target)
     if found.random is not None:
         facts += group_facts(result, found.random)
     if found.named is not None:
@@ -392,6 +403,7 @@ SECTIONS: tuple[Callable[[DesignResult], Section | None], ...] = (
     model,
     names,
     groups,
+    surrogate,
     diagnostics,
     shape,
     all_runs,

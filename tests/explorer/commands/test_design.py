@@ -305,6 +305,31 @@ def test_days_drawn_at_random_are_a_variance_component(tmp_path, process):
     assert (tmp_path / "found/data/tests.csv").read_text(encoding="utf-8").startswith("source,df,df_error,f,p")
 
 
+def test_a_process_is_set_beside_the_polynomial_and_answers_the_target(tmp_path, process):
+    """A step that no quadratic follows: tanh(4 A) + B, with A = atanh(0.5)/4 = 0.137 at B = 0 for 0.5."""
+    path, _ = made(tmp_path, "lhs", "--factors", process, "--runs", 40)
+    cells = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    a, b = np.array([[(float(one[4]) - 85) / 5, (float(one[5]) - 175) / 5] for one in cells]).T
+    fill(path, np.tanh(4 * a) + b)
+    found = analysed(path, "--surrogate", "gp", "--target", 0.5)["analysis"]
+    polynomial = found["model"]["anova"]["r_squared_predicted_by_row"]
+    assert found["surrogate"]["r_squared_predicted_by_row"] > max(polynomial, 0.99)
+    assert found["optimum"] is None
+    answer = found["surrogate_target"]
+    nearest = min(np.hypot(x, 0.5 - np.tanh(4 * x)) for x in np.linspace(-1, 1, 20001))
+    assert np.hypot((answer["point"][0] - 85) / 5, (answer["point"][1] - 175) / 5) == pytest.approx(nearest, abs=0.02)
+    said = explorer("analyse", path, "--surrogate", "gp", "--target", 0.5, "--out", tmp_path / "found").stdout
+    assert "Predicts better: the Gaussian process; R² of rows left out" in said
+    assert "Gaussian process" in (tmp_path / "found/report.md").read_text(encoding="utf-8")
+    assert "surrogate" not in analysed(path)["analysis"]
+    process.write_text(PROCESS + SOLVENT, encoding="utf-8")
+    (tmp_path / "named").mkdir()
+    named, _ = made(tmp_path / "named", "factorial", "--factors", process)
+    fill(named, range(8))
+    message = refused(explorer("analyse", named, "--surrogate", "gp"))
+    assert "--surrogate gp: solvent is no number; allowed: factors that are, --only time,temperature" in message
+
+
 @pytest.mark.parametrize(
     "options, message",
     [

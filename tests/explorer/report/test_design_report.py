@@ -11,6 +11,7 @@ import pytest
 from doe.analysis.surface import Blocks
 from doe.designs import box_behnken, central_composite, factorial, latin_hypercube, plackett_burman
 from explorer.design.analysis import AnalyseOrder, analyse_runs
+from explorer.design.choices import Surrogate
 from explorer.design.factors_file import DesignFactor
 from explorer.design.filled_sheet import Runs
 from explorer.design.result import DesignResult
@@ -65,6 +66,9 @@ def in_groups():
 
 
 CASES = {
+    "process": (runs(box_behnken(3, 5), 9 + box_behnken(3, 5) @ [1, 2, 0] + 0.1 * noise(17)), 10.0),
+    "process out of reach": (runs(factorial(2), 9 + noise((4, 3))), 1e6),
+    "process without a target": (runs(latin_hypercube(5, 12, 1), 9 + noise(12)), None),
     "random groups": (in_groups(), None),
     "names": (names(), 9.5),
     "names without a target": (names(), None),
@@ -95,7 +99,8 @@ CASES = {
 @pytest.fixture(scope="module", params=CASES, ids=str)
 def result(request):
     sheet, target = CASES[request.param]
-    return analyse_runs(sheet, AnalyseOrder("runs.csv", "load", target))
+    surrogate = Surrogate.GP if "process" in request.param else None
+    return analyse_runs(sheet, AnalyseOrder("runs.csv", "load", target, surrogate=surrogate))
 
 
 def figures(blocks):
