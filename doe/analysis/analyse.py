@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from doe.analysis.canonical import Canonical, RidgePath, canonical_analysis, ridge_analysis
 from doe.analysis.contrasts import Contrasts, Curvature, curvature, is_regular, regular_contrasts, screening_contrasts
+from doe.analysis.elementary_effects import ElementaryEffects
 from doe.analysis.few_terms import FewTermsModel, few_terms
 from doe.analysis.gaussian_process import GaussianProcess, ProcessTarget
 from doe.analysis.mixture import MixtureFit
@@ -92,8 +93,8 @@ class DesignAnalysis(Record):
     """What the runs of a design say. effects: None unless every level is low, high or (all factors) middle. model: None
     where the runs leave no error for any model. notes: sentences that a reader must know. at_target: None without an
     optimum. reduced: None without a search for terms to drop. Instead of all others: mixture of parts that add up to a
-    whole, named of factors that are names, random with groups drawn at random. surrogate: beside the model, with its
-    own setting for the target; None unless asked for.
+    whole, named of factors that are names, random with groups drawn at random, elementary of a Morris
+    design. surrogate: beside the model, with its own setting for the target; None unless asked for.
     """
 
     fits: tuple[OrderFit, ...]
@@ -106,12 +107,13 @@ class DesignAnalysis(Record):
     reduced: ReducedModel | None = None
     named: NamedFit | None = None
     random: RandomFit | None = None
+    elementary: ElementaryEffects | None = None
     surrogate: GaussianProcess | None = None
     surrogate_target: ProcessTarget | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return every field; those that not every analysis has only where it has them."""
-        optional = ("mixture", "at_target", "reduced", "named", "random", "surrogate", "surrogate_target")
+        optional = ("mixture", "at_target", "reduced", "named", "random", "elementary", "surrogate", "surrogate_target")
         own = {name for name in optional if getattr(self, name) is None}
         return {name: value for name, value in super().to_dict().items() if name not in own}
 

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.analysis.analyse import DesignAnalysis, analyse_design, reduction_words
+from doe.analysis.elementary_effects import elementary_effects
 from doe.analysis.gaussian_process import fit_process, process_target
 from doe.analysis.mixture import MixtureOrder, fit_mixture
 from doe.analysis.models import ORDERS, Order
@@ -22,6 +23,7 @@ from doe.analysis.steepest_ascent import Region
 from doe.analysis.surface import Blocks
 from doe.analysis.surface_anova import FULL
 from doe.designs import DESIGNS, factor_letters
+from doe.designs.morris import Morris
 from doe.errors import StatisticsError
 from explorer.design.choices import ModelOrder, Reduction, Surrogate
 from explorer.design.factors_file import read_factors, region_of
@@ -93,11 +95,15 @@ def run_analyse(order: AnalyseOrder) -> DesignResult:
 def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
     """The analysis of one response."""
     region = region_of(runs.factors)
+    asked_model = order.order or order.terms or order.reduction or order.surrogate
     if order.surrogate is not None:
         _refuse_surrogate(runs, order)
     if runs.groups is not None:
         found = _random(runs, region, order, runs.groups)
         return _result(runs, order, replace(found, notes=tuple(_run_notes(runs, region, found))))
+    if runs.design == Morris.name and not (asked_model or order.target is not None or order.block):
+        found = _elementary(runs, region, order)
+        return _result(runs, order, replace(found, notes=(*found.notes, *_run_notes(runs, region, found))))
     if _whole(runs, region) and order.surrogate is None:
         return _result(runs, order, _mixture(runs, region, order))
     reference = np.array([factor.reference for factor in runs.factors])
@@ -193,6 +199,16 @@ def _mixture(runs: Runs, region: Region, order: AnalyseOrder) -> DesignAnalysis:
         raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
     note = "A mixture: the factors add up to one sum in every run, and Scheffé's polynomial stands for the model."
     return DesignAnalysis((), None, None, None, (note,), mixture=found)
+
+
+def _elementary(runs: Runs, region: Region, order: AnalyseOrder) -> DesignAnalysis:
+    """The elementary effects of a Morris design; a model of the same runs has to be asked for."""
+    try:
+        found = elementary_effects(runs.coded, runs.responses, region.names)
+    except StatisticsError as error:
+        raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
+    note = "Elementary effects; --model linear, a target or --surrogate gp fits a model to the same runs."
+    return DesignAnalysis((), None, None, None, (note,), elementary=found)
 
 
 def _random(runs: Runs, region: Region, order: AnalyseOrder, groups: Blocks) -> DesignAnalysis:

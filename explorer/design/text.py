@@ -20,6 +20,7 @@ from explorer.design.factors_file import DesignFactor, FactorsFile, region_of
 from explorer.design.result import DesignResult
 from explorer.design.run_plan import RunPlan
 from explorer.report.content import Facts, Table
+from explorer.report.design.elementary import elementary_table
 from explorer.report.design.groups import components_table, estimates_table, tests_table
 from explorer.report.design.model import (
     curvature,
@@ -214,6 +215,8 @@ def analysis_text(result: DesignResult) -> str:
         parts += [_table(errors_table(result, found.surrogate)), _table(lengths_table(result, found.surrogate))]
     if found.surrogate_target is not None:
         parts.append(_table(process_settings(result, found.surrogate_target)))
+    if found.elementary is not None:
+        parts.append(_table(elementary_table(result, found.elementary)))
     told: set[str] = set()
     for section in (in_short(result), diagnostics(result), shape(result), target(result)):
         if section is not None:

@@ -16,6 +16,7 @@ from doe.stages.surface import OptimumResult
 from explorer.design.result import DesignResult
 from explorer.report.content import Banner, Block, Caution, Code, Facts, Figure, Section, Table, Text, Word
 from explorer.report.design.charts import ridge
+from explorer.report.design.elementary import elementary, elementary_facts, elementary_words, told
 from explorer.report.design.groups import ACTS, group_facts, groups
 from explorer.report.design.model import blend_words, diagnostics, effects, mixture, model, units_of_factors
 from explorer.report.design.names import fit_facts, names, target_words
@@ -239,6 +240,8 @@ def acting_words(result: DesignResult) -> str:
             if row.p < 0.05
             else f"no change by the blend is seen (p = {p_value(row.p)})"
         )
+    if found.elementary is not None:
+        return elementary_words(found.elementary)
     if found.random is not None:
         return group_facts(result, found.random)[0][1]
     if found.named is not None:
@@ -256,6 +259,8 @@ def _acting_names(result: DesignResult) -> list[str]:
         return [e.name for e in screening.effects if not e.is_dummy and abs(e.effect) > screening.lenth.margin]
     if found.mixture is not None:
         return [factor.factor for factor in result.factors] if found.mixture.rows[0].p < 0.05 else []
+    if found.elementary is not None:
+        return told(found.elementary)
     if found.random is not None:
         return [one.source.replace("*", " × ").replace("^2", "²") for one in found.random.tests if one.p < ACTS]
     anova = found.model.anova if found.model is not None else found.named
@@ -309,6 +314,8 @@ def in_short(result: DesignResult) -> Section:
         facts.append(("Predicts better", better_words(result)))
     if found.surrogate_target is not None:
         facts += target_facts(result, found.surrogate_target)
+    if found.elementary is not None:
+        facts += elementary_facts(result, found.elementary)
     if found.random is not None:
         facts += group_facts(result, found.random)
     if found.named is not None:
@@ -403,6 +410,7 @@ SECTIONS: tuple[Callable[[DesignResult], Section | None], ...] = (
     model,
     names,
     groups,
+    elementary,
     surrogate,
     diagnostics,
     shape,

@@ -285,6 +285,25 @@ def test_a_factor_of_three_names_is_a_term_with_two_degrees_of_freedom_or_blocks
     assert set(result["analysis"]["model"]["surface"]["block_names"]) == {"water", "ethanol", "oil"}
 
 
+def test_a_morris_design_tells_elementary_effects(tmp_path, process):
+    """y = 3 u_time² + 2 u_temperature on [0, 1]: the temperature acts linearly, σ = 0; of the time e = 3 (u + u')."""
+    path, said = made(tmp_path, "morris", "--factors", process)
+    assert "morris, 10 trajectories: 30 rows × 1 = 30 runs" in said
+    cells = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    fill(path, [3 * ((float(one[4]) - 80) / 10) ** 2 + 2 * (float(one[5]) - 170) / 10 for one in cells])
+    result = analysed(path)["analysis"]
+    assert result["model"] is None
+    time, temperature = result["elementary"]["effects"]
+    assert (temperature["mu_star"], temperature["sigma"]) == (pytest.approx(2), 0)
+    assert set(np.round(time["effects"], 6)) <= {2.0, 4.0}  # 3 (0 + 2/3), 3 (1/3 + 1)
+    said = explorer("analyse", path, "--out", tmp_path / "found").stdout
+    assert "Elementary effects: by μ* A" in said
+    assert "σ/μ*" in (tmp_path / "found/report.md").read_text(encoding="utf-8")
+    assert analysed(path, "--model", "linear")["analysis"]["model"] is not None
+    order = ("design", "morris", "--factors", process, "--runs", 10, "--out", tmp_path / "x.csv")
+    assert "trajectories of 2 factors have 3 runs; allowed: 9, 12" in refused(explorer(*order))
+
+
 def test_days_drawn_at_random_are_a_variance_component(tmp_path, process):
     """Three days with every run each: y = 10 + 2 A + day, the days -4, 0 and 4 (variance 16)."""
     path, _ = made(tmp_path, "factorial", "--factors", process, "--replicates", 3, "--blocks", 3)

@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 import pytest
 
 from doe.analysis.surface import Blocks
-from doe.designs import box_behnken, central_composite, factorial, latin_hypercube, plackett_burman
+from doe.designs import box_behnken, central_composite, factorial, latin_hypercube, morris, plackett_burman
 from explorer.design.analysis import AnalyseOrder, analyse_runs
 from explorer.design.choices import Surrogate
 from explorer.design.factors_file import DesignFactor
@@ -66,6 +66,7 @@ def in_groups():
 
 
 CASES = {
+    "morris": (runs(morris(6, 4, 1), 9 + morris(6, 4, 1) @ [3, 2, 1, 0, 0, 0] + 0.1 * noise(28), "morris"), None),
     "process": (runs(box_behnken(3, 5), 9 + box_behnken(3, 5) @ [1, 2, 0] + 0.1 * noise(17)), 10.0),
     "process out of reach": (runs(factorial(2), 9 + noise((4, 3))), 1e6),
     "process without a target": (runs(latin_hypercube(5, 12, 1), 9 + noise(12)), None),
