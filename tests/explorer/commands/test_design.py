@@ -298,7 +298,7 @@ def test_a_morris_design_tells_elementary_effects(tmp_path, process):
     assert set(np.round(time["effects"], 6)) <= {2.0, 4.0}  # 3 (0 + 2/3), 3 (1/3 + 1)
     said = explorer("analyse", path, "--out", tmp_path / "found").stdout
     assert "Elementary effects: by μ* A" in said
-    assert "σ/μ*" in (tmp_path / "found/report.md").read_text(encoding="utf-8")
+    assert "one step of one factor" in (tmp_path / "found/report.md").read_text(encoding="utf-8")
     assert analysed(path, "--model", "linear")["analysis"]["model"] is not None
     order = ("design", "morris", "--factors", process, "--runs", 10, "--out", tmp_path / "x.csv")
     assert "trajectories of 2 factors have 3 runs; allowed: 9, 12" in refused(explorer(*order))
