@@ -8,7 +8,7 @@ BIN := .venv/bin
 EXPLORER := $(BIN)/explorer
 
 .DEFAULT_GOAL := help
-.PHONY: help venv serve calibrate calibrate-quick diagnose test slow nightly pictures preview page-speed peers foreign rolling golden clean
+.PHONY: help venv serve calibrate calibrate-quick diagnose test slow nightly pictures preview page-speed peers foreign rolling golden against-r clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 18
@@ -65,6 +65,10 @@ rolling: .venv/.ready ## trefoil_2's rolling friction poured by our solver and b
 
 peers: .venv/.ready ## our solver against installed LIGGGHTS and YADE, with 18 pours each (hours)
 	$(BIN)/pytest tests/peers -m "slow or not slow" -s
+
+against-r: .venv/.ready ## analyses beside R's (needs R with MASS and nlme); writes tests/doe/against_r and docs/against_r.md
+	Rscript tests/doe/against_r/against_r.R tests/doe/against_r
+	$(BIN)/python -m tests.doe.against_r.compare
 
 golden: .venv/.ready ## record the golden bits of the solver and the golden readings; refused where their version does not fit
 	$(BIN)/python -m tests.solver.golden.golden_file

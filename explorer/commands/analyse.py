@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from explorer.design.choices import ModelOrder, Reduction
+from explorer.design.choices import ModelOrder, Reduction, Surrogate
 
 
 def analyse(
@@ -19,8 +19,14 @@ def analyse(
     reduce: Reduction | None = typer.Option(
         None, help="Drop terms one by one, factors after their products: by AICc, or while p > 0.05."
     ),
+    surrogate: Surrogate | None = typer.Option(
+        None, help="A Gaussian process beside the polynomial: which predicts better? --target is answered by it."
+    ),
     only: str = typer.Option("", metavar="NAME,…", help="Only these factors; the others count as scatter."),
     block: str = typer.Option("", metavar="NAME", help="Column of days, batches or operators: a fixed effect each."),
+    random: str = typer.Option(
+        "", metavar="NAME", help="Column of groups drawn at random (days, whole plots, seeds): a variance component."
+    ),
     factors: str | None = typer.Option(None, metavar="FILE", help="Factors file, for a sheet that declares none."),
     out: Path | None = typer.Option(
         None, metavar="DIR", help="New folder for result.json, the report, its figures and data."
@@ -50,7 +56,9 @@ def analyse(
         terms=_names(terms),
         only=_names(only),
         block=block,
+        random=random,
         reduction=reduce,
+        surrogate=surrogate,
         out=out,
         author=author,
         notes=notes,

@@ -21,6 +21,12 @@ class Reduction(StrEnum):
     P = "p"
 
 
+class Surrogate(StrEnum):
+    """Models without terms that are set beside the polynomial."""
+
+    GP = "gp"
+
+
 class ModelOrder(StrEnum):
     """Orders of the polynomial."""
 

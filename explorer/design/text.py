@@ -20,6 +20,8 @@ from explorer.design.factors_file import DesignFactor, FactorsFile, region_of
 from explorer.design.result import DesignResult
 from explorer.design.run_plan import RunPlan
 from explorer.report.content import Facts, Table
+from explorer.report.design.elementary import elementary_table
+from explorer.report.design.groups import components_table, estimates_table, tests_table
 from explorer.report.design.model import (
     curvature,
     diagnostics,
@@ -28,7 +30,9 @@ from explorer.report.design.model import (
     fit_summary,
     mixture_table,
 )
+from explorer.report.design.names import groups_table, means_table
 from explorer.report.design.sections import factor_table, in_short, settings_table, shape, target
+from explorer.report.design.surrogate import errors_table, lengths_table, process_settings
 from explorer.report.sections.surface import anova_table, variance_table
 from explorer.tables.text_table import text_table
 from explorer.units import enumeration, number
@@ -199,6 +203,20 @@ def analysis_text(result: DesignResult) -> str:
         parts += [_table(fit_summary(found)), _table(anova_table(found.model.anova))]
     if found.mixture is not None:
         parts += [_table(mixture_table(result, found.mixture)), _table(variance_table(found.mixture.rows))]
+    if found.named is not None:
+        parts += [_table(variance_table(found.named.rows, "")), _table(means_table(result, found.named.means))]
+        parts.append(_table(groups_table(result, found.named)))
+    if found.random is not None:
+        parts += [_table(components_table(result, found.random)), _table(tests_table(found.random))]
+        parts.append(_table(estimates_table(found.random)))
+        if found.random.means:
+            parts.append(_table(means_table(result, found.random.means)))
+    if found.surrogate is not None:
+        parts += [_table(errors_table(result, found.surrogate)), _table(lengths_table(result, found.surrogate))]
+    if found.surrogate_target is not None:
+        parts.append(_table(process_settings(result, found.surrogate_target)))
+    if found.elementary is not None:
+        parts.append(_table(elementary_table(result, found.elementary)))
     told: set[str] = set()
     for section in (in_short(result), diagnostics(result), shape(result), target(result)):
         if section is not None:
