@@ -13,15 +13,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from doe.laboratory import LabResult
 from doe.provenance import About
-from doe.record import Record
 from doe.studies.study_result import StudyResult
+from explorer.audit.report import AuditResult, audit_report
 from explorer.design.result import DesignResult
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.errors import CommandError
 from explorer.report import study_report
-from explorer.report.bench import bench_report
+from explorer.report.bench import BenchResult, bench_report
 from explorer.report.content import Banner, Block, Drawing, Figure, Folded, Picture, Report, Section, Strong, Table
 from explorer.report.design import design_report
 from explorer.report.diagnosis import diagnosis_report
@@ -40,20 +39,18 @@ class Part:
     report: Report
 
 
-@dataclass(frozen=True)
-class BenchFile(Record):
-    """The content of ``bench.json``."""
-
-    result: LabResult
-    about: About
-
-
 def _picture(folder: Path) -> bytes | None:
     pictures = sorted((folder / "figures").glob(f"figure_*_{READ}.png"))
     return pictures[0].read_bytes() if pictures else None
 
 
 KINDS: dict[str, tuple[str, Callable[[Content], bool], Callable[[Content], Any], Callable[[Any, Path], Report]]] = {
+    "Audit": (
+        AuditResult.NAME,
+        lambda _: True,
+        AuditResult.from_dict,
+        lambda result, _: audit_report(result),
+    ),
     "Photographs": (
         PhotographResult.NAME,
         lambda _: True,
@@ -61,10 +58,10 @@ KINDS: dict[str, tuple[str, Callable[[Content], bool], Callable[[Content], Any],
         lambda result, folder: photograph_report(result, _picture(folder)),
     ),
     "Bench test": (
-        "bench.json",
+        BenchResult.NAME,
         lambda _: True,
-        BenchFile.from_dict,
-        lambda file, _: bench_report(file.result, file.about),
+        BenchResult.from_dict,
+        lambda result, _: bench_report(result),
     ),
     "Design": (
         "result.json",
