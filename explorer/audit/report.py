@@ -177,7 +177,8 @@ def graded(audit: Audit) -> content.Spec:
         if any(counts[place, status] for place in places)
     ]
     rows = axis("", categoryorder="array", categoryarray=list(map(label, places[::-1])))
-    return chart(traces, {"barmode": "stack", "xaxis": axis("printed figures"), "yaxis": rows}, 110 + ROW * len(places))
+    layout = {"barmode": "stack", "xaxis": axis("printed figures"), "yaxis": rows}
+    return chart(traces, layout, 110 + ROW * len(places))
 
 
 def _table(figures: tuple[Figure, ...], how: str) -> tuple[Block, ...]:

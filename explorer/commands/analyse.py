@@ -22,8 +22,8 @@ def analyse(
     only: str = typer.Option("", metavar="NAME,…", help="Only these factors; the others count as scatter."),
     block: str = typer.Option("", metavar="NAME", help="Column of days, batches or operators: a fixed effect each."),
     factors: str | None = typer.Option(None, metavar="FILE", help="Factors file, for a sheet that declares none."),
-    out: Path | None = typer.Option(
-        None, metavar="DIR", help="New folder for result.json, the report, its figures and data."
+    report: Path | None = typer.Option(
+        None, "--report", "--out", metavar="DIR", help="New folder for result.json, the report, its figures and data."
     ),
     author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
     notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
@@ -51,14 +51,14 @@ def analyse(
         only=_names(only),
         block=block,
         reduction=reduce,
-        out=out,
+        out=report,
         author=author,
         notes=notes,
     )
     result = run_analyse(order)
     typer.echo(json_text(result.to_dict()) if json else analysis_text(result))
-    if out is not None and not json:
-        typer.echo(f"\nwrote {out / 'report.html'}, report.md, result.json")
+    if report is not None and not json:
+        typer.echo(f"\nwrote {report / 'report.html'}, report.md, result.json")
 
 
 def _names(text: str) -> tuple[str, ...]:

@@ -92,6 +92,7 @@ def _thirds(reading: PhotographedPile) -> Iterator[tuple[Array, Array]]:
         for (low, high), slope_deg in zip(pairwise(THIRDS), angle.thirds_deg, strict=True):
             ends = reading.height * np.array([low, high])
             there = (side * u > 0.0) & (z >= ends[0]) & (z <= ends[1])
+            ends = ends + np.array([0.1, -0.1]) * np.ptp(ends)  # gaps, so that three lines are seen
             if there.sum() > 1 and abs(slope_deg) > LEVEL_DEG:
                 run = (ends - z[there].mean()) / np.tan(np.radians(slope_deg))
                 yield u[there].mean() - side * run, ends

@@ -35,12 +35,12 @@ from explorer.report.content import (
 )
 from explorer.report.figures.bench import (
     bench_unit,
-    by_unit,
     curve_charts,
     curve_title,
     interval,
     is_straight,
     replicates,
+    side_by_side_quantities,
     sieve_charts,
     specimen,
 )
@@ -246,13 +246,14 @@ def _curves(found: BenchResult) -> Iterator[Figure]:
 
 
 def _replicates(result: LabResult) -> Iterator[Figure]:
-    for k, own in enumerate(by_unit(result), start=1):
+    for k, found in enumerate(side_by_side_quantities(result), start=1):
+        own = [one for of in found.values() for one in of]
         sizes = sorted({one.summary.n for one in own})
         n = " … ".join(map(str, dict.fromkeys((sizes[0], sizes[-1]))))
         errors = ", with the errors of the readings" if any(one.reading for one in own) else ""
         tests = enumeration(sorted({one.summary.outlier_test for one in own}))
         caption = f"n = {n} replicates of each. Bar: 95 % of the mean by Student’s t{errors}. Outliers by {tests}, 5 %."
-        yield Figure(f"replicates-{k}", replicates(own), caption)
+        yield Figure(f"replicates-{k}", replicates(found), caption)
 
 
 def _inputs(found: Readings) -> Iterator[Block]:

@@ -167,7 +167,7 @@ def plan_methods(result: PlanResult) -> Methods:
     family = _family(result.design)
     text = (
         f"A {family} design{citations(DESIGNS.get(family, ()))} of {len(result.coded)} rows over "
-        f"{len(result.factors)} factors was made, each row {result.replicates} times: {len(result.sequence)} runs"
+        f"{len(result.factors)} factors was made, {result.replicates} runs of each: {len(result.sequence)} runs"
         f"{f' in {max(result.block)} blocks' if result.block else ''}. Order of the runs and whatever of the design is "
         f"drawn: seed {result.seed}."
     )

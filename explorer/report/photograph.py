@@ -118,9 +118,14 @@ def photograph_result(measured: MeasuredPhotographs, author: str, notes: str) ->
 def read_picture(order: MeasureOrder, measured: MeasuredPhotographs) -> bytes:
     """The pictures with what was read, as PNG of at most ``MOST_BYTES``."""
     pictures = [open_picture(path) for path in order.pictures]
-    drawn = sheet(pictures, measured.readings, measured.simulated, thirds=True)
-    while len(found := _png(drawn)) > MOST_BYTES:
-        drawn = drawn.resize((round(0.8 * drawn.width), round(0.8 * drawn.height)), Image.Resampling.LANCZOS)
+    return png_within(MOST_BYTES, sheet(pictures, measured.readings, measured.simulated, thirds=True))
+
+
+def png_within(most: int, picture: Image.Image) -> bytes:
+    """A picture as PNG of at most ``most`` bytes, made smaller until it is."""
+    while len(found := _png(picture)) > most:
+        size = round(0.8 * picture.width), round(0.8 * picture.height)
+        picture = picture.resize(size, Image.Resampling.LANCZOS)
     return found
 
 
@@ -205,8 +210,7 @@ def banner(result: PhotographResult) -> Banner:
         return Banner(
             Word.MEASURED,
             f"{fixed(mean)} ± {fixed(result.piles[0].mean[1])}°",
-            "One picture; ±: 95 % of reading this silhouette. How far pours differ it cannot say."
-            f"{beside}",
+            f"One picture; ±: 95 % of reading this silhouette. How far pours differ it cannot say.{beside}",
             "Photograph four more pours: a study needs the standard deviation between them.",
         )
     return Banner(

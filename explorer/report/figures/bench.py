@@ -7,7 +7,7 @@ solver every column against the first.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -30,16 +30,22 @@ from explorer.report.figures.style import (
     label,
     line,
     points,
+    side_by_side,
+    suffix,
 )
-from explorer.units import ReadingUnit, enumeration, reading_unit
+from explorer.units import ReadingUnit, reading_unit
 
 PANEL_HEIGHT = 420
 ROW = 34
 """Height of a row of replicates [px]."""
+ACROSS = 3
+"""Quantities side by side."""
 MOST_POINTS = 10_000
 """Of the curves of one chart."""
 LEAST_POINTS = 3
 """Fewer readings of the solver's instrument are a few numbers, which the table has, and no curve."""
+NEGLIGIBLE = 1e-9
+"""Spread relative to the mean that is rounding."""
 SAMPLES = (FACTOR, ASSUMPTION, TARGET, CHOSEN)
 
 
@@ -103,55 +109,62 @@ def is_straight(curve: CurveFit) -> bool:
     return isinstance(curve.fit, LinearRange)
 
 
-def by_unit(result: LabResult) -> list[list[Derived]]:
-    """What replicates gave, in groups of one unit, which share a chart."""
-    groups: dict[str, list[Derived]] = {}
+def side_by_side_quantities(result: LabResult) -> list[dict[str, list[Derived]]]:
+    """What replicates gave by quantity, as many of them as a chart has panels in each."""
+    found: dict[str, list[Derived]] = {}
     for one in result.derived:
         if one.name not in CONDITIONS:
-            groups.setdefault(one.unit, []).append(one)
-    return list(groups.values())
+            found.setdefault(one.name, []).append(one)
+    names = [name for name, own in found.items() if any(map(_shows, own))]
+    return [{name: found[name] for name in names[k : k + ACROSS]} for k in range(0, len(names), ACROSS)]
 
 
-def _names_of(found: Sequence[Derived]) -> str:
-    return enumeration(list(dict.fromkeys(one.name.replace("_", " ") for one in found)))
+def _shows(one: Derived) -> bool:
+    """Whether there is something to see: replicates of one value, as of a speed that was set, are no scatter."""
+    return one.summary.n == 1 or one.summary.sd > NEGLIGIBLE * abs(one.summary.mean)
 
 
-def replicates(found: Sequence[Derived]) -> Spec:
-    """Every replicate with the mean and its interval, a row for each quantity; a single one has no interval."""
-    unit = bench_unit(found[0].unit)
-    names = dict.fromkeys(one.name for one in found)
-    rows = [f"{one.name.replace('_', ' ') if len(names) > 1 else ''} {specimen(one)}".strip() for one in found]
-    single: tuple[list[float], list[str], list[str]] = ([], [], [])
-    apart: tuple[list[float], list[str], list[str]] = ([], [], [])
-    for row, one in zip(rows, found, strict=True):
-        for k, (name, value) in enumerate(zip(one.replicates, one.values, strict=True)):
-            x, y, told = apart if k in one.summary.outliers else single
-            x.append(unit.of(value))
-            y.append(label(row))
-            told.append(f"replicate {label(name)}")
-    seen = "%{y}, %{text}: %{x:.4g}<extra></extra>"
-    traces = [
-        points(
-            x, y, name, colour, text=told, hovertemplate=seen, marker={"size": size, "symbol": symbol, "opacity": 0.6}
+def replicates(found: Mapping[str, list[Derived]]) -> Spec:
+    """A panel for each quantity: its replicates with mean and interval, a row for each component or pair."""
+    rows = list(dict.fromkeys(specimen(one) for own in found.values() for one in own))
+    layout: Json = {"yaxis": axis("", categoryorder="array", categoryarray=list(map(label, rows[::-1])))}
+    traces: list[Json] = []
+    told: set[str] = set()
+    for k, (domain, (name, own)) in enumerate(zip(side_by_side(len(found)), found.items(), strict=True)):
+        unit = bench_unit(own[0].unit)
+        words = name.replace("_", " ")
+        layout[f"xaxis{suffix(k)}"] = axis(
+            f"{words} [{unit.symbol}]" if unit.symbol else words, domain=domain, nticks=5
         )
-        for name, colour, size, symbol, (x, y, told) in (
-            ("replicates", FACTOR, 7, "circle", single),
-            ("outliers, kept", CHOSEN, 9, "x", apart),
-        )
-        if x
-    ]
-    half = [interval(one)[1] / unit.size for one in found]
-    means = [unit.of(one.summary.mean) for one in found]
-    mean = points(
-        means, list(map(label, rows)), "mean, 95 % of it", ASSUMPTION, marker={"size": 10, "symbol": "diamond"}
-    )
-    traces.append(mean | {"error_x": error_bars(half, ASSUMPTION)})
-    title = f"{_names_of(found)} [{unit.symbol}]" if unit.symbol else _names_of(found)
-    layout: Json = {
-        "xaxis": axis(title),
-        "yaxis": axis("", categoryorder="array", categoryarray=list(map(label, rows[::-1]))),
-    }
-    return chart(traces, layout, 110 + ROW * len(rows))
+        for trace in _panel(own, unit):
+            place = {"xaxis": f"x{suffix(k)}", "yaxis": "y", "legendgroup": trace["name"]}
+            traces.append(trace | place | {"showlegend": trace["name"] not in told})
+            told.add(trace["name"])
+    return chart(traces, layout, 120 + ROW * len(rows))
+
+
+def _panel(own: Sequence[Derived], unit: ReadingUnit) -> Iterator[Json]:
+    """Replicates, outliers and means; a single replicate has no interval."""
+    seen = "%{y}, replicate %{text}: %{x:.4g}<extra></extra>"
+    for name, colour, size, symbol, odd in (
+        ("replicates", FACTOR, 7, "circle", False),
+        ("outliers, kept", CHOSEN, 9, "x", True),
+    ):
+        x, y, told = [], [], []
+        for one in own:
+            for k, (replicate, value) in enumerate(zip(one.replicates, one.values, strict=True)):
+                if (k in one.summary.outliers) == odd:
+                    x.append(unit.of(value))
+                    y.append(label(specimen(one)))
+                    told.append(label(replicate))
+        if x:
+            marker = {"size": size, "symbol": symbol, "opacity": 0.6}
+            yield points(x, y, name, colour, text=told, hovertemplate=seen, marker=marker)
+    means = [unit.of(one.summary.mean) for one in own]
+    half = [interval(one)[1] / unit.size for one in own]
+    rows = [label(specimen(one)) for one in own]
+    mark = points(means, rows, "mean, 95 % of it", ASSUMPTION, marker={"size": 10, "symbol": "diamond"})
+    yield mark | {"error_x": error_bars(half, ASSUMPTION)}
 
 
 def sieve_charts(readings: Sequence[Reading]) -> dict[str, Spec]:
