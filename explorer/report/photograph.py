@@ -138,16 +138,15 @@ def _png(picture: Image.Image) -> bytes:
 def photograph_report(result: PhotographResult, picture: bytes | None) -> Report:
     """The report; ``picture`` is what :func:`read_picture` gave, None where it is lost."""
     names = ", ".join([*(pile.name for pile in result.piles), *result.refused])
-    blocks: list[Block] = [_angles(result)]
+    blocks: list[Block] = [_angles(result)] if result.piles else []
     if picture is not None:
+        lines = "the outline, both flank lines and the base line drawn over them: " if result.piles else "no angle: "
         blocks.append(
             Picture(
                 READ,
                 picture,
-                f"Photographs of piles with the outline, both flank lines and the base line drawn over them: {names}",
-                f"n = {len(result.piles) + len(result.refused)} pictures, read by one silhouette each. White: outline; "
-                "orange: flank lines (least squares); green: their lower, middle and upper third; blue: base line."
-                + (f" Lowest: the simulated pile {result.simulated}." if result.simulated else ""),
+                f"Photographs of piles with {lines}{names}",
+                f"{_counted(result)} {_drawn(result)}".strip(),
             )
         )
     methods, references = photograph_methods(result)
@@ -191,6 +190,19 @@ def photograph_report(result: PhotographResult, picture: bytes | None) -> Report
     )
 
 
+def _counted(result: PhotographResult) -> str:
+    n = len(result.piles) + len(result.refused)
+    return "n = 1 picture, read by its silhouette." if n == 1 else f"n = {n} pictures, read by one silhouette each."
+
+
+def _drawn(result: PhotographResult) -> str:
+    """What the lines on the pictures are."""
+    if not result.piles:
+        return "None was read, and nothing is drawn."
+    lines = "White: outline; orange: flank lines (least squares); green: their thirds; blue: base line."
+    return f"{lines} Lowest: the simulated pile {result.simulated}." if result.simulated else lines
+
+
 def banner(result: PhotographResult) -> Banner:
     """The angle with its spread over pictures, or that there is none."""
     n, lost = len(result.piles), len(result.refused)
@@ -199,9 +211,7 @@ def banner(result: PhotographResult) -> Banner:
         return Banner(
             Word.REFUSED,
             "",
-            f"{first}: {why}"
-            if lost == 1
-            else f"None of {lost} pictures shows a pile that can be read; below for each why.",
+            f"{first}: {why}" if lost == 1 else f"None of {lost} pictures shows a pile that can be read.",
             "Take the picture again as its refusal says." if lost == 1 else "Take them again as their refusals say.",
         )
     mean, sd, half = result.over_pictures
@@ -244,9 +254,9 @@ def outlines(result: PhotographResult) -> Spec:
 
 
 def _outline_words(result: PhotographResult) -> str:
-    return (
-        f"n = {len(result.piles)} piles, the upper edge of each silhouette over its base line, both axes on one scale."
-    )
+    n = len(result.piles)
+    piles = "pile" if n == 1 else "piles"
+    return f"n = {n} {piles}, the upper edge of each silhouette over its base line, both axes on one scale."
 
 
 def _angles(result: PhotographResult) -> Table:

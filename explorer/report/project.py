@@ -163,7 +163,7 @@ def project_report(folders: list[Path], title: str, about: About) -> Report:
         sections += [_renamed(section, f"{k}. {part.kind}", f"part-{k}-") for section in part.report.sections]
     return Report(
         title=title or decisive.title,
-        subtitle=f"Project report: {', '.join(part.kind.lower() for part in parts)}",
+        subtitle=f"Project report: {', '.join(dict.fromkeys(part.kind.lower() for part in parts))}",
         banner=Banner(
             decisive.banner.word,
             decisive.banner.of,
