@@ -140,12 +140,12 @@ def photograph_report(result: PhotographResult, picture: bytes | None) -> Report
     names = ", ".join([*(pile.name for pile in result.piles), *result.refused])
     blocks: list[Block] = [_angles(result)] if result.piles else []
     if picture is not None:
-        lines = "the outline, both flank lines and the base line drawn over them: " if result.piles else "no angle: "
+        over = "the outline, both flank lines and the base line drawn over them: " if result.piles else "no angle: "
         blocks.append(
             Picture(
                 READ,
                 picture,
-                f"Photographs of piles with {lines}{names}",
+                f"Photographs of piles with {over}{names}",
                 f"{_counted(result)} {_drawn(result)}".strip(),
             )
         )

@@ -290,15 +290,9 @@ def _sheet(result: PlanResult) -> DataTable:
     """The runs in their order, levels in the units of the factors, as the sheet has them."""
     natural = region_of(result.factors).natural(result.coded)
     own = (*COLUMNS, BLOCK) if result.block else COLUMNS
-    rows = tuple(
-        (
-            row,
-            replicate,
-            position + 1,
-            result.seeds[position],
-            *([result.block[position]] if result.block else []),
-            *(level_text(factor, value) for factor, value in zip(result.factors, natural[row - 1], strict=True)),
-        )
-        for position, (row, replicate) in enumerate(result.sequence)
-    )
-    return DataTable("runs", (*own, *(factor.title for factor in result.factors)), rows)
+    rows: list[tuple[str | int, ...]] = []
+    for position, (row, replicate) in enumerate(result.sequence):
+        block = result.block[position : position + 1]
+        settings = [level_text(one, value) for one, value in zip(result.factors, natural[row - 1], strict=True)]
+        rows.append((row, replicate, position + 1, result.seeds[position], *block, *settings))
+    return DataTable("runs", (*own, *(factor.title for factor in result.factors)), tuple(rows))
