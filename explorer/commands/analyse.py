@@ -28,8 +28,8 @@ def analyse(
         "", metavar="NAME", help="Column of groups drawn at random (days, whole plots, seeds): a variance component."
     ),
     factors: str | None = typer.Option(None, metavar="FILE", help="Factors file, for a sheet that declares none."),
-    out: Path | None = typer.Option(
-        None, metavar="DIR", help="New folder for result.json, the report, its figures and data."
+    report: Path | None = typer.Option(
+        None, "--report", "--out", metavar="DIR", help="New folder for result.json, the report, its figures and data."
     ),
     author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
     notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
@@ -59,14 +59,14 @@ def analyse(
         random=random,
         reduction=reduce,
         surrogate=surrogate,
-        out=out,
+        out=report,
         author=author,
         notes=notes,
     )
     result = run_analyse(order)
     typer.echo(json_text(result.to_dict()) if json else analysis_text(result))
-    if out is not None and not json:
-        typer.echo(f"\nwrote {out / 'report.html'}, report.md, result.json")
+    if report is not None and not json:
+        typer.echo(f"\nwrote {report / 'report.html'}, report.md, result.json")
 
 
 def _names(text: str) -> tuple[str, ...]:

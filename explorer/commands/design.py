@@ -69,6 +69,11 @@ def design(
     standard_order: bool = typer.Option(False, "--standard-order", help="Do not shuffle the runs."),
     sigma: float | None = typer.Option(None, help="Standard deviation of one run: what will the design see?"),
     effect: float | None = typer.Option(None, help="With which chance will it see a change so large?"),
+    report: Path | None = typer.Option(
+        None, metavar="DIR", help="New folder for plan.json, the report of the runs, its figures and data."
+    ),
+    author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
+    notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
     json: bool = typer.Option(False, "--json", help="Print plain data."),
 ) -> None:
     """Write the runs of a design; says what is confused with what, and which effects it will be able to see."""
@@ -78,7 +83,8 @@ def design(
     from explorer.design.text import plan_result, plan_text
     from explorer.errors import CommandError
     from explorer.files.output_file import write_whole_bytes
-    from explorer.files.run_folder import json_text
+    from explorer.files.run_folder import appearing, check_vacant, json_text
+    from explorer.files.run_result import made_today
     from solver.assets import asset_path
 
     if out.exists():
@@ -88,6 +94,8 @@ def design(
         raise CommandError(f"--decimal-comma: {out} is a workbook, which shows numbers as its reader has them")
     if not out.absolute().parent.is_dir():
         raise CommandError(f"--out {out}: no folder {out.absolute().parent}")
+    if report is not None:
+        check_vacant(report, "--report")
     for option, value in (("--sigma", sigma), ("--effect", effect)):
         if value is not None and not 0 < value < float("inf"):
             raise CommandError(f"{option} {value:g}: allowed: a positive number")
@@ -115,5 +123,12 @@ def design(
     # Without the mark at its head a spreadsheet takes the file's letters for Windows's.
     text = "\ufeff" * decimal_comma + sheet_text(plan, file, decimal_comma)
     write_whole_bytes(out, sheet_workbook(plan, file) if workbook else text.encode())
+    if report is not None:
+        from explorer.report.design.plan import design_plan, plan_report
+        from explorer.report.folder import write_report
+
+        made = design_plan(plan, file, sigma, effect, made_today(author, notes))
+        with appearing(report, "--report") as folder:
+            write_report(plan_report(made), folder, {made.NAME: json_text(made.to_dict()) + "\n"})
     then = f"explorer analyse {out}{' --block block' if blocks else ''}"
     typer.echo(said if json else f"{said}\n\nwrote {out}; fill in {', '.join(file.responses)}, then: {then}")

@@ -37,6 +37,9 @@ from explorer.report.sections.surface import anova_table, variance_table
 from explorer.tables.text_table import text_table
 from explorer.units import enumeration, number
 
+TERMS = {"factor": "of a factor", "interaction": "of an interaction", "square": "curvature, centre → end"}
+"""Kind of a term → the change that it is, in words."""
+
 
 def plan_result(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: float | None) -> dict[str, Any]:
     """A design as JSON types."""
@@ -56,8 +59,8 @@ def plan_result(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: f
         **({"block": (plan.block + 1).tolist()} if len(plan.block) else {}),
         "aliases": list(plan.points.aliases),
         **({} if plan.points.efficiency is None else _optimal_result(plan)),
-        "model": None if _many_names(file) else planned_order(plan),
-        "power": [] if _many_names(file) else plain(list(_power(plan, sigma, effect))),
+        "model": planned_order(plan, file),
+        "power": plain(list(planned_power(plan, file, sigma, effect))),
     }
 
 
@@ -84,8 +87,8 @@ def plan_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: flo
                 for letter, f in zip(letters, file.factors, strict=True)
             ],
         ),
-        *_beyond(plan, file),
-        *_blocks(plan),
+        *beyond(plan, file),
+        *blocks(plan),
     ]
     if plan.points.aliases:
         lines = "\n".join(plan.points.aliases)
@@ -102,7 +105,7 @@ def _range(factor: DesignFactor) -> list[str]:
     return [number(factor.low, 6), number(factor.high, 6), factor.unit or "1"]
 
 
-def _beyond(plan: RunPlan, file: FactorsFile) -> list[str]:
+def beyond(plan: RunPlan, file: FactorsFile) -> list[str]:
     """A sentence about runs beyond low … high, which a laboratory may not be able to make."""
     if plan.finished or np.abs(plan.coded).max() <= 1 + 1e-9:
         return []
@@ -114,7 +117,7 @@ def _beyond(plan: RunPlan, file: FactorsFile) -> list[str]:
     return [f"The axial runs go beyond low … high: {enumeration(ends)}. --alpha inscribed keeps them within."]
 
 
-def _blocks(plan: RunPlan) -> list[str]:
+def blocks(plan: RunPlan) -> list[str]:
     """A sentence about the blocks: their sizes, in the order in which they are run."""
     if not len(plan.block):
         return []
@@ -128,7 +131,7 @@ def _power_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: f
         return _mixture_text(plan)
     if _many_names(file):
         return "What it will see is not told for a factor of three names and more."
-    found = _power(plan, sigma, effect)
+    found = planned_power(plan, file, sigma, effect)
     if not found:
         return (
             "As many effects as runs: nothing is left for the error. Effects can be held against Lenth's margin alone; "
@@ -138,9 +141,7 @@ def _power_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: f
     header = ["change, low → high", "terms", "standard error", "seen with chance 0.8", "for all at once"]
     rows = [
         [
-            {"factor": "of a factor", "interaction": "of an interaction", "square": "curvature, centre → end"}[
-                one.kind
-            ],
+            TERMS[one.kind],
             str(one.terms),
             *(number(value) for value in (one.standard_error, one.smallest, one.smallest_of_all)),
             *([number(one.power)] if effect else []),
@@ -149,7 +150,7 @@ def _power_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: f
     ]
     table = text_table([*header, f"chance to see {number(effect)}"] if effect else header, rows)
     return (
-        f"what the {planned_order(plan)} model will see at p < 0.05, in {unit} "
+        f"what the {planned_order(plan, file)} model will see at p < 0.05, in {unit} "
         f"({found[0].df} degrees of freedom for the error):\n{table}"
     )
 
@@ -165,8 +166,12 @@ def _mixture_text(plan: RunPlan) -> str:
     return f"The runs bear Scheffé's {order} polynomial ({terms} terms), with {df} degrees of freedom for the error."
 
 
-def planned_order(plan: RunPlan) -> Order | None:
-    """The model that the runs bear beside their blocks; None where they leave no error even for the linear one."""
+def planned_order(plan: RunPlan, file: FactorsFile) -> Order | None:
+    """The model that the runs bear beside their blocks; None where they leave no error even for the linear one, and
+    with a factor of three names and more.
+    """
+    if _many_names(file):
+        return None
     letters = factor_letters(plan.coded.shape[1])
     runs, values = plan.coded[plan.sequence[:, 0]], np.zeros((len(plan.sequence), 1))
     blocks = None
@@ -179,8 +184,11 @@ def planned_order(plan: RunPlan) -> Order | None:
     return highest_order(runs, values, letters, blocks=blocks)
 
 
-def _power(plan: RunPlan, sigma: float | None, effect: float | None) -> tuple[TermPrecision, ...]:
-    order = planned_order(plan)
+def planned_power(
+    plan: RunPlan, file: FactorsFile, sigma: float | None, effect: float | None
+) -> tuple[TermPrecision, ...]:
+    """What the runs will tell of each kind of the model's terms, in units of sigma where that is not known."""
+    order = planned_order(plan, file)
     if order is None:
         return ()
     letters = factor_letters(plan.coded.shape[1])

@@ -38,9 +38,9 @@ from explorer.measured.readings import Brought
 from explorer.photograph.annotated import sheet
 from explorer.photograph.run import MeasuredPhotographs, MeasureOrder, measure_order, outline_text, run_measure
 from explorer.photograph.target import PhotographedTarget, check_targets, keep_target
-from explorer.report.bench import bench_charts, curve_charts
 from explorer.report.design import design_html
 from explorer.report.design.charts import design_plots
+from explorer.report.figures.bench import bench_charts, curve_charts
 from explorer.report.study_charts import Plot, Plots
 from explorer.scene.source import command_line, rig_source
 from explorer.tables.laboratory import lab_text

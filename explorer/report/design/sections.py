@@ -24,6 +24,7 @@ from explorer.report.design.surrogate import better_words, surrogate, target_fac
 from explorer.report.figures.model import cloud, ranges
 from explorer.report.figures.surface import solutions
 from explorer.report.identified import GIVES_TARGET, cloud_caution, rule, settings
+from explorer.report.methods import design_methods
 from explorer.report.sections.optimum import ranges_caption
 from explorer.report.sections.surface import equation
 from explorer.units import (
@@ -402,6 +403,11 @@ def repeat(result: DesignResult) -> Section:
     return Section("How to repeat", (Text(text), command, Table(("program", "version"), versions)))
 
 
+def methods(result: DesignResult) -> Section:
+    """The paragraph for a paper."""
+    return design_methods(result)[0]
+
+
 SECTIONS: tuple[Callable[[DesignResult], Section | None], ...] = (
     in_short,
     target,
@@ -415,5 +421,6 @@ SECTIONS: tuple[Callable[[DesignResult], Section | None], ...] = (
     diagnostics,
     shape,
     all_runs,
+    methods,
     repeat,
 )
