@@ -53,6 +53,15 @@ class UploadSlot:
         value = str(self._choice.value)
         return str(self._sent.get(value, value))
 
+    @property
+    def visible(self) -> bool:
+        """Whether the list and its button are shown."""
+        return bool(self._choice.visible)
+
+    @visible.setter
+    def visible(self, shown: bool) -> None:
+        self._choice.visible = self.upload.visible = shown
+
     def offer(self, examples: Sequence[str]) -> None:
         """Other examples than before; the first is chosen unless a file that was sent is."""
         self._examples = tuple(examples)
@@ -86,3 +95,19 @@ def number_or_none(text: str, what: str) -> float | None:
     if not math.isfinite(number):
         raise CommandError(f"{what} {text.strip()[:40]!r}: allowed is a number, or nothing")
     return number
+
+
+def whole_or_none(text: str, what: str, least: int, most: int | None) -> int | None:
+    """A whole number that a person typed, None for nothing; CommandError for anything else."""
+    number = number_or_none(text, what)
+    if number is None:
+        return None
+    if number != int(number) or not least <= number <= (math.inf if most is None else most):
+        allowed = f"{least} … {most}" if most is not None else f"{least} and more"
+        raise CommandError(f"{what} {text.strip()[:40]!r}: allowed is a whole number, {allowed}, or nothing")
+    return int(number)
+
+
+def parts_of(text: str, mark: str) -> tuple[str, ...]:
+    """What a person typed with ``mark`` between: names, terms, conditions."""
+    return tuple(part for one in text.split(mark) if (part := one.strip()))
