@@ -23,7 +23,8 @@ from solver.assets import asset_path, shipped_assets
 
 SHEET = (
     "Name your factors in a file (Factors file to edit gives one to start from), upload it, or take the shipped one. "
-    "Then: Make the sheet. Fill in its results, and upload it under Filled sheet → model and optimum."
+    "An empty box means: as usual. Then: Make the sheet. Fill in its results, and upload it under Filled sheet → model "
+    "and optimum."
 )
 NUMBERS = {
     "runs": ("Size", "Rows of the table or of the fraction, or points; empty: as usual for the design."),

@@ -34,10 +34,15 @@ class UploadSlot:
         self._suffixes, self._folder, self._follow = tuple(suffixes), folder, follow
         self._sent: dict[str, Path] = {}
         self._examples = tuple(examples)
-        self._choice = server.gui.add_dropdown(label, self._examples, hint=hint)
-        self.upload = server.gui.add_upload_button(
-            f"Upload: {label.lower()}", mime_type=",".join(suffixes), hint=f"A file ending in {', '.join(suffixes)}."
-        )
+        # In a place of their own, as viser's client shows a button of uploads whether it is visible or not.
+        self._place = server.gui.add_folder(None)
+        with self._place:
+            self._choice = server.gui.add_dropdown(label, self._examples, hint=hint)
+            self.upload = server.gui.add_upload_button(
+                f"Upload: {label.lower()}",
+                mime_type=",".join(suffixes),
+                hint=f"A file ending in {', '.join(suffixes)}.",
+            )
 
         @self._choice.on_update
         def _(event: viser.GuiEvent[Any]) -> None:
@@ -56,11 +61,11 @@ class UploadSlot:
     @property
     def visible(self) -> bool:
         """Whether the list and its button are shown."""
-        return bool(self._choice.visible)
+        return bool(self._place.visible)
 
     @visible.setter
     def visible(self, shown: bool) -> None:
-        self._choice.visible = self.upload.visible = shown
+        self._place.visible = shown
 
     def offer(self, examples: Sequence[str]) -> None:
         """Other examples than before; the first is chosen unless a file that was sent is."""

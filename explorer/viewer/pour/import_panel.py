@@ -27,7 +27,7 @@ WAITING = "A script is read, never run. What was converted, what was not taken a
 class ImportPanel(Panel):
     """Program, name, upload; what came of it, and a button that pours it."""
 
-    name, tab, title = "import", SET_UP, "A material from LIGGGHTS, YADE or EDEM"
+    name, tab, title = "import", SET_UP, "From LIGGGHTS, YADE, EDEM"
 
     def __init__(self, page: PageContext) -> None:
         gui, post = page.server.gui, page.post

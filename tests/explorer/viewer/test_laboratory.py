@@ -153,8 +153,8 @@ def test_a_design_asks_for_what_it_takes(bench):
 
 def shown_labels(panel):
     """Labels of what a panel shows."""
-    handles = [getattr(one, "_choice", one) for one in (*vars(panel).values(), *panel._numbers.values())]
-    return {one.label for one in handles if hasattr(one, "label") and one.visible}
+    handles = [one for one in (*vars(panel).values(), *panel._numbers.values()) if getattr(one, "visible", False)]
+    return {getattr(getattr(one, "_choice", one), "label", "") for one in handles}
 
 
 @pytest.mark.parametrize(
@@ -440,6 +440,8 @@ def test_a_command_line_is_selected_as_a_whole():
         CommandResult("word " * 30, "explorer audit")
     )
     assert "user-select:all" in html
+    # Columns stay in line, however many there are.
+    assert "pre-wrap; overflow-wrap" not in answer_html(CommandResult("seed  shear_modulus  10" * 9, "explorer lab"))
     rows = (("height", "40.0 mm (95 % 39 … 41 mm)"), ("<b>", "&"))
     html = answer_html(CommandResult("", "explorer measure", tables={"a <b>.png": rows}, note="both > 0"))
     # Lines end between words, and not between a number and its unit.
