@@ -163,7 +163,7 @@ def test_a_change_is_held_against_the_former_parameters(table):
     table.look()
     seen = table.look()
     assert "13.0 ± 1.0° SD (3 seeds)" in seen
-    assert "static friction seed–seed 0.57 → 0.2: -9.0 ±" in seen
+    assert "static friction seed–seed 0.57 → 0.2: -9.0°, 95 % " in seen
     assert "in 3 pours" in seen
 
 
