@@ -29,7 +29,7 @@ PHASE_WORDS = {
     Phase.RUN: "turning",
     Phase.AT_REST: "at rest",
 }
-SLOWER = "slower than asked"
+SLOWER = "slow"
 STATE_WORDS = {
     SessionState.STARTING: "starting",
     SessionState.RUNNING: "running",

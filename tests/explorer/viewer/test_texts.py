@@ -76,7 +76,7 @@ def test_the_time_step_is_told_against_its_limit():
     ("now", "word"),
     [
         ({}, ""),
-        ({"capped": True}, "slower than asked"),
+        ({"capped": True}, "slow"),
         ({"state": SessionState.ENDED, "outcome": Outcome.AT_REST}, "at rest"),
         ({"state": SessionState.ENDED, "outcome": Outcome.JAMMED}, "jammed"),
         ({"state": SessionState.ENDED, "outcome": Outcome.NO_HEAP}, "no heap"),
