@@ -38,14 +38,8 @@ def analyse(
     """Effects, model, analysis of variance, diagnostics, canonical analysis, and the settings that give a target."""
     from explorer.design.analysis import AnalyseOrder, run_analyse
     from explorer.design.text import analysis_text
-    from explorer.errors import CommandError
     from explorer.files.run_folder import json_text
 
-    for option, value in (("--target", target), ("--target-error", target_error)):
-        if value is not None and not abs(value) < float("inf"):
-            raise CommandError(f"{option} {value:g}: allowed: a finite number")
-    if model is not None and terms:
-        raise CommandError("--terms: stands instead of --model; allowed: one of them")
     order = AnalyseOrder(
         sheet=sheet,
         response=response,

@@ -76,6 +76,13 @@ def run_analyse(order: AnalyseOrder) -> DesignResult:
     from explorer.report.design import design_report
     from explorer.report.folder import write_report
 
+    for option, value in (("--target", order.target), ("--target-error", order.target_error)):
+        if value is not None and not abs(value) < math.inf:
+            raise CommandError(f"{option} {value:g}: allowed: a finite number")
+    if order.target_error < 0:
+        raise CommandError(f"--target-error {order.target_error:g}: allowed: 0 and more")
+    if order.order is not None and order.terms:
+        raise CommandError("--terms: stands instead of --model; allowed: one of them")
     path = asset_path("runs", order.sheet)
     factors = read_factors(asset_path("designs", order.factors)).factors if order.factors else ()
     sheet = read_sheet(path, factors)

@@ -19,6 +19,7 @@ from doe.record import plain
 from explorer.design.factors_file import DesignFactor, FactorsFile, region_of
 from explorer.design.result import DesignResult
 from explorer.design.run_plan import RunPlan
+from explorer.errors import CommandError
 from explorer.report.content import Facts, Table
 from explorer.report.design.elementary import elementary_table
 from explorer.report.design.groups import components_table, estimates_table, tests_table
@@ -39,6 +40,13 @@ from explorer.units import enumeration, number
 
 TERMS = {"factor": "of a factor", "interaction": "of an interaction", "square": "curvature, centre → end"}
 """Kind of a term → the change that it is, in words."""
+
+
+def check_power(sigma: float | None, effect: float | None) -> None:
+    """Refuse what is neither the standard deviation of a run nor a change of its result."""
+    for option, value in (("--sigma", sigma), ("--effect", effect)):
+        if value is not None and not 0 < value < math.inf:
+            raise CommandError(f"{option} {value:g}: allowed: a positive number")
 
 
 def plan_result(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: float | None) -> dict[str, Any]:

@@ -90,10 +90,10 @@ def _write(order: LabOrder, result: LabResult, part: dict[str, Any]) -> None:
     """The files that were asked for."""
     about = made_today(order.author, order.notes)
     if order.figure or order.report:
-        from explorer.report.bench import bench_report, bench_result, write_curves
+        from explorer.report.bench import bench_record, bench_report, write_curves
         from explorer.report.folder import write_report
 
-        found = bench_result(result, about, _files(order))
+        found = bench_record(result, about, files_of(order))
         if order.figure:
             write_curves(order.figure, found)
         if order.report:
@@ -118,7 +118,7 @@ def analysed(order: LabOrder) -> LabResult:
     return analyse(order.test, path)
 
 
-def _files(order: LabOrder) -> list[tuple[str, Path]]:
+def files_of(order: LabOrder) -> list[tuple[str, Path]]:
     """Test and file of every sheet of readings that ``order`` names."""
     files = [(order.test, order.file), ("compression", order.compression)]
     return [(test, asset_path("laboratory", name)) for test, name in files if name is not None]

@@ -84,7 +84,7 @@ class BenchResult(Record):
     kind: str = "bench"
 
 
-def bench_result(result: LabResult, about: About, files: Sequence[tuple[str, Path]]) -> BenchResult:
+def bench_record(result: LabResult, about: About, files: Sequence[tuple[str, Path]]) -> BenchResult:
     """The record of ``result``; ``files``: test and file of the readings."""
     return BenchResult(result, about, tuple(_readings(test, path) for test, path in files), versions())
 

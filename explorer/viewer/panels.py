@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from explorer.viewer.laboratory.analysis_panel import AnalysisPanel
 from explorer.viewer.laboratory.audit_panel import AuditPanel
 from explorer.viewer.laboratory.bench_panel import BenchPanel
 from explorer.viewer.laboratory.design_panel import DesignPanel
@@ -19,6 +20,7 @@ from explorer.viewer.pour.chart import Chart
 from explorer.viewer.pour.controls_panel import ControlsPanel
 from explorer.viewer.pour.disturb_panel import DisturbPanel
 from explorer.viewer.pour.grain_panel import GrainPanel
+from explorer.viewer.pour.import_panel import ImportPanel
 from explorer.viewer.pour.live_panel import LivePanel
 from explorer.viewer.pour.motion_chart import MotionChart
 from explorer.viewer.pour.outline_panel import OutlinePanel
@@ -56,6 +58,7 @@ PANELS: Registry[type[Panel]] = Registry(
         ChangesPanel,
         ScenePanel,
         GrainPanel,
+        ImportPanel,
         RestartPanel,
         SecondPile,
         LookPanel,
@@ -70,6 +73,7 @@ PANELS: Registry[type[Panel]] = Registry(
         PhotographPanel,
         MeasuredDataPanel,
         DesignPanel,
+        AnalysisPanel,
         AuditPanel,
         ReportsPanel,
     ),

@@ -21,7 +21,7 @@ from explorer.audit.report import graded
 from explorer.errors import CommandError
 from explorer.photograph.annotated import THIRD, sheet
 from explorer.photograph.run import measure_order, run_measure
-from explorer.report.bench import bench_report, bench_result
+from explorer.report.bench import bench_record, bench_report
 from explorer.report.content import Figure, Picture, Table, Word
 from explorer.report.folder import MANIFEST
 from explorer.report.html import page
@@ -82,7 +82,7 @@ def rows_of(path):
 def bench(test, other=None):
     """The report of a shipped example."""
     path = asset_path("laboratory", other or test)
-    return bench_report(bench_result(analyse(test, path), About(), [(test, path)]))
+    return bench_report(bench_record(analyse(test, path), About(), [(test, path)]))
 
 
 # The form that all have
@@ -271,7 +271,7 @@ def test_one_replicate_is_no_answer(tmp_path):
 def test_a_folder_without_readings_is_reported_as_well():
     """As those of an older version are."""
     path = asset_path("laboratory", "inclined_plane")
-    report = bench_report(bench_result(analyse("inclined_plane", path), About(), []))
+    report = bench_report(bench_record(analyse("inclined_plane", path), About(), []))
     assert "Readings" not in [one.title for one in report.sections]
 
 
