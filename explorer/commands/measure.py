@@ -23,6 +23,9 @@ def measure(
     baseline: str = typer.Option(
         "auto", metavar="auto|Y0,Y1", help="Plate in px from the top, at the left and the right edge of the picture."
     ),
+    checkerboard: str | None = typer.Option(
+        None, metavar="PHOTO", help="A printed checkerboard by the same camera: its corners tell the lens, taken out."
+    ),
     json: bool = typer.Option(False, "--json", help="Print plain data, with the profiles, and nothing else."),
     plot: Path | None = typer.Option(None, metavar="FILE.png", help="New file: the pictures with what was read."),
     outline: Path | None = typer.Option(
@@ -44,11 +47,16 @@ def measure(
 
     Exit code 1 where a picture shows no pile that could be read; the line says why.
     """
+    from explorer.errors import CommandError
     from explorer.files.run_folder import appearing, check_vacant, json_text
     from explorer.photograph.run import measure_order, run_measure
     from explorer.tables.photograph import measure_result, measure_text, refusal_lines
 
-    order = measure_order(photos, scale, reference_length, reference, baseline, plot, outline, from_simulation)
+    order = measure_order(
+        photos, scale, reference_length, reference, baseline, plot, outline, from_simulation, checkerboard
+    )
+    if target is not None and checkerboard is not None:
+        raise CommandError("--target: its pictures are read again without --checkerboard; leave one of the two out")
     if report is not None:
         check_vacant(report, "--report")
     measured = run_measure(order)

@@ -24,8 +24,8 @@ Kind = Literal["plate", "foot", "given", "support"]
 SHOULDER = 0.04
 """Share of the part's width, at either end, that is level where a plate shows beside the pile."""
 SLOPES = (0.08, 0.2)
-"""Most by which the rise over run of both ends differs, of a plate's and of one that goes on beyond the picture; and the
-rounding to a pixel over an end."""
+"""Most by which the rise over run of both ends differs, of a plate's and of one that goes on beyond the picture, beside
+the rounding to a pixel over an end."""
 INNER = 0.10
 """Share of the part's width at either end where the pile is too thin to tell its foot."""
 REACH = 6

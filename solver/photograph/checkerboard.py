@@ -29,8 +29,8 @@ BLUR = 2.0
 STRONG = 0.25
 """Of the strength of the last of the strongest ``FEWEST`` corners."""
 OPPOSITE, AROUND = 0.5, 5.0
-"""Correlation of the grey levels about a corner with those opposite, and the radius of that ring [px]: of a corner of the
-board itself, where one field is alone, it is negative."""
+"""Correlation of the grey levels about a corner with those opposite, and the radius of that ring [px]: of a corner of
+the board itself, where one field is alone, it is negative."""
 APART = 7
 """Pixels within which a peak is the largest."""
 NEAR = 0.3

@@ -106,8 +106,8 @@ def read_photograph(
     """The pile in ``picture``, or why there is none.
 
     ``metres_per_pixel``: of the picture itself. ``base_line``: y [px of the picture] of the plate at its left and its
-    right edge; found by itself if None. ``bend``: of the lens, where a checkerboard told it (`checkerboard.py`); the base
-    line tells it if None.
+    right edge; found by itself if None. ``bend``: of the lens, where a checkerboard told it (`checkerboard.py`); the
+    base line tells it if None.
     """
     try:
         if bend is None:

@@ -115,8 +115,8 @@ def severed(part: Image) -> Image | None:
 
 
 def rimless(part: Image) -> Image:
-    """``part`` of a mask (row 0 on top) without a glass dish's rim: thin bars that stick out of both sides, with nothing
-    right under them."""
+    """``part`` of a mask (row 0 on top) without a glass dish's rim: thin bars that stick out of both sides, with
+    nothing right under them."""
     rows = np.flatnonzero(part.any(axis=1))
     body = ndimage.binary_opening(part, np.ones((max(3, round(THIN * rows.size)), 1), dtype=bool))
     columns = np.flatnonzero(body.any(axis=0))
