@@ -10,8 +10,7 @@ from tests.solver.photograph.campaign import shot, summary, table
 
 DOCS = Path(__file__).parents[3] / "docs"
 LEVEL = (3, 8, 11, 20, 39, 57, 2003, 2226)
-"""Seeds with a funnel on a plate, dishes, discs, a lens, a plate with one end in view, and a rim over the foot, of level
-cameras."""
+"""Seeds of level cameras: funnels, dishes, discs, a lens, a plate with one end in view, a rim over the foot."""
 
 
 def test_a_few_pictures():
