@@ -8,7 +8,7 @@ BIN := .venv/bin
 EXPLORER := $(BIN)/explorer
 
 .DEFAULT_GOAL := help
-.PHONY: help venv serve calibrate calibrate-quick diagnose test slow nightly pictures preview page-speed peers foreign rolling golden against-r clean
+.PHONY: help venv serve calibrate calibrate-quick diagnose test slow nightly pictures photographs preview page-speed peers foreign rolling golden against-r clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 18
@@ -50,6 +50,9 @@ nightly: .venv/.ready ## what is too long for CI (80 min at most); writes docs/n
 
 pictures: .venv/.ready ## the pictures of README and docs, taken from the running program (needs Chromium; 25 min)
 	$(BIN)/python -m tests.browser.pictures
+
+photographs: .venv/.ready ## rendered photographs of piles, read by seed (resumes); writes docs/photographs.json (5 min)
+	$(BIN)/python -m tests.solver.photograph.campaign 3000 3119 docs/photographs.json
 
 preview: .venv/.ready ## record the pour that the page shows while its solver loads (1 min)
 	$(BIN)/python -m tests.browser.preview

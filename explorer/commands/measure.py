@@ -23,6 +23,9 @@ def measure(
     baseline: str = typer.Option(
         "auto", metavar="auto|Y0,Y1", help="Plate in px from the top, at the left and the right edge of the picture."
     ),
+    checkerboard: str | None = typer.Option(
+        None, metavar="PHOTO", help="A printed checkerboard by the same camera: its corners tell the lens, taken out."
+    ),
     json: bool = typer.Option(False, "--json", help="Print plain data, with the profiles, and nothing else."),
     plot: Path | None = typer.Option(None, metavar="FILE.png", help="New file: the pictures with what was read."),
     outline: Path | None = typer.Option(
@@ -53,10 +56,17 @@ def measure(
     from explorer.photograph.target import check_targets, keep_target, write_into_study
     from explorer.tables.photograph import measure_result, measure_text, refusal_lines
 
-    order = measure_order(photos, scale, reference_length, reference, baseline, plot, outline, from_simulation)
+    order = measure_order(
+        photos, scale, reference_length, reference, baseline, plot, outline, from_simulation, checkerboard
+    )
     if report is not None:
         check_vacant(report, "--report")
     study = target if target is not None and target.suffix == ".toml" and not target.is_dir() else None
+    if target is not None and study is None and checkerboard is not None:
+        raise CommandError(
+            "--target DIR: its pictures are read again without --checkerboard; leave one of the two out, or name a "
+            "STUDY.toml"
+        )
     if study is not None:
         if not study.is_file():
             raise CommandError(f"--target {study}: no such study; `explorer new study NAME` writes one")
