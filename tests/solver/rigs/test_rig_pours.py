@@ -13,7 +13,7 @@ from solver.pours.record import Outcome, Phase
 from solver.pours.run import Job, capacity_for, run_pours
 from solver.scenes.material_file import load_material, with_settings
 from solver.scenes.scene import with_values
-from tests.explorer.beads import RADIUS, bead_scene
+from tests.explorer.beads import bead_scene
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
@@ -60,24 +60,7 @@ DRUM = with_settings(
     },
 )
 
-LIPPED = with_settings(
-    bead_scene(14),
-    {
-        "rig.name": "lipped_plate",
-        "rig.lip_height": "8mm",
-        "rig.diameter": "60mm",
-        "rig.lift_speed": 0.1,
-        "rig.lift_height": "50mm",
-        "rig.cylinder_height": "60mm",
-        "insertion.region_radius": "25mm",
-        "insertion.rate": "200g/s",
-        "effect.twisting.strength": 1.0,
-        "numerics.max_time": 2.0,
-    },
-)
-"""Round bodies that nothing keeps from rolling, and a lip higher than their middles."""
-BARE = dataclasses.replace(LIPPED, rig=dataclasses.replace(LIPPED.rig, lip_height=1e-4))
-"""The lip is too low to feel."""
+
 DENSE = with_settings(DRUM, {"rig.filled_volume": "150mL", "rig.packing": 1.0})
 """More than fits in."""
 LOW = with_settings(BOX, {"rig.box_height": "10mm", "rig.mass": "40g"})
@@ -101,7 +84,7 @@ class Run:
 
 def run(scene, seed=1):
     # One capacity for all, so that kernels are compiled once.
-    room = capacity_for([CYLINDER, LIPPED, BOX, DRUM, DENSE, LOW], 2)
+    room = capacity_for([CYLINDER, BOX, DRUM, DENSE, LOW], 2)
     return Run(Pour(Batch(room), 1, scene, seed), [])
 
 
@@ -131,14 +114,6 @@ def test_a_lifted_cylinder_leaves_a_pile_and_loses_no_mass(lifted):
     # All of it lay within the cylinder's radius; it spreads when the wall goes.
     assert seen["footprint_r90_m"].value > 0.02
     assert 5.0 < seen["angle_of_repose_cone_deg"].value < 60.0
-
-
-def test_a_lip_keeps_what_would_roll_away():
-    """Centres of spheres that touch the lip stand a radius inside of it; on the bare plate some roll on beyond."""
-    reach = [np.hypot(*run(scene).on().pour.record().bodies.position[:, :2].T).max() for scene in (LIPPED, BARE)]
-    radius = LIPPED.rig.lip_diameter / 2.0 - RADIUS
-    assert reach[0] <= radius + 0.02 * RADIUS
-    assert reach[1] > radius + RADIUS
 
 
 def test_a_moving_rig_repeats_its_bits_whatever_the_launches(lifted):
