@@ -8,7 +8,7 @@ BIN := .venv/bin
 EXPLORER := $(BIN)/explorer
 
 .DEFAULT_GOAL := help
-.PHONY: help venv serve calibrate calibrate-quick diagnose test slow nightly pictures preview page-speed faults peers foreign rolling golden clean
+.PHONY: help venv serve calibrate calibrate-quick diagnose test slow nightly pictures photographs preview page-speed faults peers foreign rolling golden against-r clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 18
@@ -51,6 +51,9 @@ nightly: .venv/.ready ## what is too long for CI (80 min at most); writes docs/n
 pictures: .venv/.ready ## the pictures of README and docs, taken from the running program (needs Chromium; 25 min)
 	$(BIN)/python -m tests.browser.pictures
 
+photographs: .venv/.ready ## rendered photographs of piles, read by seed (resumes); writes docs/photographs.json (5 min)
+	$(BIN)/python -m tests.solver.photograph.campaign 3000 3119 docs/photographs.json
+
 preview: .venv/.ready ## record the pour that the page shows while its solver loads (1 min)
 	$(BIN)/python -m tests.browser.preview
 
@@ -69,6 +72,10 @@ rolling: .venv/.ready ## trefoil_2's rolling friction poured by our solver and b
 
 peers: .venv/.ready ## our solver against installed LIGGGHTS and YADE, with 18 pours each (hours)
 	$(BIN)/pytest tests/peers -m "slow or not slow" -s
+
+against-r: .venv/.ready ## analyses beside R's (needs R with MASS and nlme); writes tests/doe/against_r and docs/against_r.md
+	Rscript tests/doe/against_r/against_r.R tests/doe/against_r
+	$(BIN)/python -m tests.doe.against_r.compare
 
 golden: .venv/.ready ## record the golden bits of the solver and the golden readings; refused where their version does not fit
 	$(BIN)/python -m tests.solver.golden.golden_file

@@ -176,7 +176,7 @@ def observable_label(name: str) -> str:
         return _own(name)[0]
     experiment, _, reading = name.rpartition("/")
     known = OBSERVABLES.get(reading)
-    label = (known.label if known else "") or reading.replace("_", " ")
+    label = (known.label if known else "") or reading.removesuffix("_deg").replace("_", " ")
     return f"{label}, {experiment.replace('_', ' ')}" if experiment else label
 
 

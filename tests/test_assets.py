@@ -1,6 +1,7 @@
 """The shipped data agree with the published tables, with each other, and are found."""
 
 import csv
+import math
 import statistics
 import tomllib
 from pathlib import Path
@@ -195,9 +196,65 @@ def test_a_users_file_is_found_by_its_path(tmp_path, monkeypatch):
     assert asset_path("materials", "sunflower_extract") != own
 
 
+COMMON = [name for name in shipped_assets("materials") if name not in ("sunflower_extract", "nine_sphere_seed")]
+"""Materials that are shipped beside those of the article."""
+
+
+def declared_numbers(table):
+    """Path → number (or numbers) of what a material file says of its materials, bodies, pairs and effects."""
+    found = {f"materials.{name}.{key}": n for name, entry in table["materials"].items() for key, n in entry.items()}
+    for body in table["body"]:
+        ((_, size),) = body["shape"].items()
+        found[f"body.{body['name']}.shape"] = size
+    for a, partners in table["pair"].items():
+        found |= {f"pair.{a}.{b}.{key}": number for b, entry in partners.items() for key, number in entry.items()}
+    for name, entry in table.get("effect", {}).items():
+        found |= {f"effect.{name}.{key}": number for key, number in entry.items()}
+    return found
+
+
+@pytest.mark.parametrize("name", COMMON)
+def test_every_number_of_a_common_material_has_a_source_or_is_assumed(name):
+    """And a spread, or says that its source states none; what is assumed is there to be assumed."""
+    table = load(asset_path("materials", name))
+    numbers, assumed = declared_numbers(table), set(table["assumed"])
+    assert assumed <= set(numbers)
+    for path, number in numbers.items():
+        entry = table["measured"]
+        for key in path.split("."):
+            entry = entry.get(key, {})
+        assert entry or path in assumed, path
+        if entry:
+            assert path in assumed or entry["value"] == number
+            assert entry["source"]
+            assert {"sd", "low"} & set(entry) or "spread not stated" in entry["source"], path
+
+
+@pytest.mark.parametrize("name", COMMON)
+def test_what_nobody_measured_of_a_common_material_says_why(name):
+    """Behind every assumed number stands a comment with the reason."""
+    text = asset_path("materials", name).read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if "# assumed: " in line or "# [m] assumed: " in line]
+    assert len(lines) == len(load(asset_path("materials", name))["assumed"])
+    assert all(line.split("assumed: ")[1].strip() for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("name", "thousand", "tolerance"),
+    [("soybean", 103.57e-3, 0.05), ("maize", 240.36e-3, 0.01), ("rice", 27.63e-3, 0.03), ("abs_beads", 0.200, 0.001)],
+)
+def test_a_grain_weighs_what_its_source_weighed(name, thousand, tolerance):
+    """Its solid of the measured axes at the measured density against the measured mass of 1000 grains [kg]."""
+    table = load(asset_path("materials", name))
+    (body,) = table["body"]
+    axes = body["shape"].get("ellipsoid") or 3 * [body["shape"]["sphere"]]
+    mass = math.pi / 6.0 * math.prod(axes) * table["materials"][body["material"]]["density"]
+    assert 1000.0 * mass == pytest.approx(thousand, rel=tolerance)
+
+
 def test_an_unknown_name_lists_what_is_shipped():
-    with pytest.raises(AssetNotFoundError, match=r"'wheat'.*shipped: .*sunflower_extract"):
-        asset_path("materials", "wheat")
+    with pytest.raises(AssetNotFoundError, match=r"'gold'.*shipped: .*sunflower_extract"):
+        asset_path("materials", "gold")
 
 
 @pytest.mark.parametrize("name", ["", ".", "..", ".toml"])

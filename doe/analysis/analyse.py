@@ -16,7 +16,9 @@ import numpy.typing as npt
 
 from doe.analysis.canonical import Canonical, RidgePath, canonical_analysis, ridge_analysis
 from doe.analysis.contrasts import Contrasts, Curvature, curvature, is_regular, regular_contrasts, screening_contrasts
+from doe.analysis.elementary_effects import ElementaryEffects
 from doe.analysis.few_terms import FewTermsModel, few_terms
+from doe.analysis.gaussian_process import GaussianProcess, ProcessTarget
 from doe.analysis.mixture import MixtureFit
 from doe.analysis.model_adequacy import BoxCox, Diagnostics, box_cox, diagnose_fit
 from doe.analysis.models import (
@@ -32,7 +34,9 @@ from doe.analysis.models import (
     reduced_model,
     terms_of,
 )
-from doe.analysis.optimum import Optimum, find_optimum
+from doe.analysis.named_factors import NamedFit
+from doe.analysis.optimum import Optimum, ResponseTarget, find_optimum
+from doe.analysis.random_groups import RandomFit
 from doe.analysis.replicates import row_moments
 from doe.analysis.screening import Screening, analyse_screening
 from doe.analysis.steepest_ascent import Region
@@ -87,9 +91,10 @@ class TargetIntervals(Record):
 @dataclass(frozen=True)
 class DesignAnalysis(Record):
     """What the runs of a design say. effects: None unless every level is low, high or (all factors) middle. model: None
-    where the runs leave no error for any model. notes: sentences that a reader must know. mixture: of parts that add up
-    to a whole, instead of all others. at_target: None without an optimum. reduced: None without a search for terms to
-    drop.
+    where the runs leave no error for any model. notes: sentences that a reader must know. at_target: None without an
+    optimum. reduced: None without a search for terms to drop. Instead of all others: mixture of parts that add up to a
+    whole, named of factors that are names, random with groups drawn at random, elementary of a Morris
+    design. surrogate: beside the model, with its own setting for the target; None unless asked for.
     """
 
     fits: tuple[OrderFit, ...]
@@ -100,20 +105,17 @@ class DesignAnalysis(Record):
     mixture: MixtureFit | None = None
     at_target: TargetIntervals | None = None
     reduced: ReducedModel | None = None
+    named: NamedFit | None = None
+    random: RandomFit | None = None
+    elementary: ElementaryEffects | None = None
+    surrogate: GaussianProcess | None = None
+    surrogate_target: ProcessTarget | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return every field; those that not every analysis has only where it has them."""
-        own = {name for name in ("mixture", "at_target", "reduced") if getattr(self, name) is None}
+        optional = ("mixture", "at_target", "reduced", "named", "random", "elementary", "surrogate", "surrogate_target")
+        own = {name for name in optional if getattr(self, name) is None}
         return {name: value for name, value in super().to_dict().items() if name not in own}
-
-
-@dataclass(frozen=True)
-class ResponseTarget(Record):
-    """What the response should be, the standard error of that value, and the setting to stay near (natural, (k,))."""
-
-    value: float
-    standard_error: float
-    reference: FloatArray
 
 
 def analyse_design(
@@ -142,7 +144,7 @@ def analyse_design(
     if reduction is not None and chosen is not None:
         reduced = reduced_model(coded, responses, region, chosen, reduction, blocks)
         chosen = reduced.terms
-        notes.append(_reduced(reduced))
+        notes.append(reduction_words(reduced))
     model = None if chosen is None else _model(fit_surface(coded, responses, region, chosen, blocks), region.names)
     if model is None:
         notes.append("The runs leave no error for a model: effects stand beside Lenth's margin only.")
@@ -172,8 +174,8 @@ def analyse_design(
     return DesignAnalysis(fits, effects, model, optimum, tuple(notes), at_target=at_target, reduced=reduced)
 
 
-def _reduced(found: ReducedModel) -> str:
-    """A sentence: what was dropped, and what that does to the tests of what is left."""
+def reduction_words(found: ReducedModel) -> str:
+    """Return a sentence: what was dropped, and what that does to the tests of what is left."""
     rule = "AICc" if found.rule == "aicc" else f"p > {STAYS:g}"
     if not found.dropped:
         return f"Reduction by {rule} drops no term."

@@ -7,7 +7,7 @@ tested against its own residual. Source: Myers, Montgomery and Anderson-Cook 201
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal, get_args
@@ -109,36 +109,46 @@ def reduced_model(
     counts the coefficients, the blocks' and sigma (Hurvich and Tsai 1989, Biometrika 76:297). By "p" the term of the
     largest p, as long as that is above 0.05. Raises StatisticsError where the runs do not bear `terms`.
     """
+
+    def residual(kept: Sequence[str]) -> tuple[float, int]:
+        return _residual(fit_surface(coded, responses, region, kept, blocks))
+
+    return eliminate(terms, rule, residual, int((~np.isnan(responses)).sum()))
+
+
+def eliminate(
+    terms: Sequence[str], rule: Reduction, residual: Callable[[Sequence[str]], tuple[float, int]], runs: int
+) -> ReducedModel:
+    """Drop one term after the other from any linear model, as `reduced_model` says; a term may have several columns.
+
+    residual: of a model of these terms, the sum of squares and its degrees of freedom. runs: number of valid ones.
+    """
     left, dropped = list(terms), []
-    fitted = fit_surface(coded, responses, region, left, blocks)
+    fitted = residual(left)
     while len(left) > 1:
         free = [term for term in left if not any(term != other and term in _parts(other) for other in left)]
-        without = {
-            term: fit_surface(coded, responses, region, [one for one in left if one != term], blocks) for term in free
-        }
+        without = {term: residual([one for one in left if one != term]) for term in free}
         if rule == "aicc":
-            chosen = min(free, key=lambda term: corrected_aic(without[term]))
-            if not corrected_aic(without[chosen]) < corrected_aic(fitted):
+            chosen = min(free, key=lambda term: corrected_aic(*without[term], runs))
+            if not corrected_aic(*without[chosen], runs) < corrected_aic(*fitted, runs):
                 break
         else:
-            p = {term: _added((_residual(without[term])), _residual(fitted))[1] for term in free}
+            p = {term: _added(without[term], fitted)[1] for term in free}
             chosen = max(free, key=lambda term: p[term])
             if not p[chosen] > STAYS:
                 break
         left.remove(chosen)
         dropped.append(chosen)
         fitted = without[chosen]
-    return ReducedModel(rule, tuple(left), tuple(dropped), corrected_aic(fitted) if rule == "aicc" else math.nan)
+    return ReducedModel(rule, tuple(left), tuple(dropped), corrected_aic(*fitted, runs) if rule == "aicc" else math.nan)
 
 
-def corrected_aic(surface: Surface) -> float:
-    """Return AICc of a fitted surface; infinite where there are too few runs for its correction."""
-    n = surface.observed.size
-    q = n - surface.df_residual + 1
+def corrected_aic(squares: float, df: int, n: int) -> float:
+    """Return AICc of n runs by the residual sum of squares with its df; infinite where there are too few runs."""
+    q = n - df + 1
     if n - q - 1 < 1:
         return math.inf
-    squares = max(surface.mse * surface.df_residual, np.finfo(np.float64).tiny)
-    return n * math.log(squares / n) + 2 * q + 2 * q * (q + 1) / (n - q - 1)
+    return n * math.log(max(squares, np.finfo(np.float64).tiny) / n) + 2 * q + 2 * q * (q + 1) / (n - q - 1)
 
 
 def _parts(term: str) -> tuple[str, ...]:

@@ -54,6 +54,15 @@ TIE = 1e-3
 
 
 @dataclass(frozen=True)
+class ResponseTarget(Record):
+    """What the response should be, the standard error of that value, and the setting to stay near (natural, (k,))."""
+
+    value: float
+    standard_error: float
+    reference: FloatArray
+
+
+@dataclass(frozen=True)
 class Optimum(Record):
     """The chosen setting. Arrays of shape (factors,) in natural units unless named coded.
 

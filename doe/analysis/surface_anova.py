@@ -81,30 +81,30 @@ def analyse_surface(surface: Surface) -> SurfaceAnova:
     n, p = model.shape
     mean = float(surface.observed.mean())
     residual_ss = float(found.ssr)
-    total_ss = _total_sum_of_squares(surface.observed)
-    block_rows = _block(surface, total_ss)
+    total_ss = total_sum_of_squares(surface.observed)
+    block_rows = block_row(surface.observed, surface.block_of_run, total_ss) if surface.block_names else ()
     explained_ss = max(0.0, total_ss - residual_ss)
     model_ss = max(0.0, explained_ss - sum(row.sum_of_squares for row in block_rows))
     mse = surface.mse if total_ss > 0 else 0.0
     chosen = np.flatnonzero(surface.included)[1:]
-    model_row = _tested("model", model_ss, len(chosen), mse, surface.df_residual)
+    model_row = tested("model", model_ss, len(chosen), mse, surface.df_residual)
     of_terms = slice(1, 1 + len(chosen))
     term_ss = found.params[of_terms] ** 2 / np.diag(found.normalized_cov_params)[of_terms]
     term_rows = [
-        _tested(surface.terms[k], float(ss) if total_ss > 0 else 0.0, 1, mse, surface.df_residual)
+        tested(surface.terms[k], float(ss) if total_ss > 0 else 0.0, 1, mse, surface.df_residual)
         for k, ss in zip(chosen, term_ss, strict=True)
     ]
     influence = found.get_influence()
     # A run that is indispensable to the fit cannot be predicted from the others.
     indispensable = bool((surface.leverage > FULL).any())
     press = math.inf if indispensable else float((influence.resid_press**2).sum())
-    predicted_r2 = math.nan if indispensable else _ratio(total_ss - press, total_ss)
+    predicted_r2 = math.nan if indispensable else ratio(total_ss - press, total_ss)
     rows = (
         *block_rows,
         model_row,
         *term_rows,
         AnovaRow("residual", residual_ss, surface.df_residual, mse, math.nan, math.nan),
-        *_lack_of_fit(surface, residual_ss),
+        *lack_of_fit(surface.observed, surface.point_of_run, residual_ss, surface.df_residual),
         AnovaRow("total", total_ss, n - 1, total_ss / (n - 1), math.nan, math.nan),
     )
     better = bool(model_row.p < 0.05 and (indispensable or predicted_r2 > 0))
@@ -112,63 +112,64 @@ def analyse_surface(surface: Surface) -> SurfaceAnova:
         rows=rows,
         mean=mean,
         sigma=math.sqrt(mse),
-        cv_percent=_ratio(100 * math.sqrt(mse), abs(mean)),
-        r_squared=_ratio(explained_ss, total_ss),
-        r_squared_adjusted=1 - _ratio(mse * (n - 1), total_ss),
+        cv_percent=ratio(100 * math.sqrt(mse), abs(mean)),
+        r_squared=ratio(explained_ss, total_ss),
+        r_squared_adjusted=1 - ratio(mse * (n - 1), total_ss),
         r_squared_predicted=predicted_r2,
-        r_squared_predicted_by_row=1 - _ratio(_press_by_row(surface, residuals), total_ss),
+        r_squared_predicted_by_row=1 - ratio(_press_by_row(surface, residuals), total_ss),
         press=press,
-        adequate_precision=_ratio(float(np.ptp(surface.predicted)), math.sqrt(p * mse / n)),
+        adequate_precision=ratio(float(np.ptp(surface.predicted)), math.sqrt(p * mse / n)),
         coefficient_standard_errors=np.sqrt(mse * np.diag(surface.information_inverse)),
-        studentized_residuals=_externally_studentized(influence, mse, surface.df_residual),
+        studentized_residuals=externally_studentized(influence, mse, surface.df_residual),
         better_than_noise=better,
         notes=_notes(rows, total_ss, predicted_r2, better, bool(surface.included.all())),
     )
 
 
-def _total_sum_of_squares(observed: FloatArray) -> float:
+def total_sum_of_squares(observed: FloatArray) -> float:
     """Return the sum of squares about the mean, exactly zero when values differ by rounding only."""
     dust = 8 * np.finfo(np.float64).eps * float(np.abs(observed).max())
     return 0.0 if np.ptp(observed) <= dust else float(((observed - observed.mean()) ** 2).sum())
 
 
-def _ratio(numerator: float, denominator: float) -> float:
+def ratio(numerator: float, denominator: float) -> float:
+    """Return a ratio; NaN for a denominator that is not positive."""
     return numerator / denominator if denominator > 0 else math.nan
 
 
-def _tested(source: str, sum_of_squares: float, df: int, error_ms: float, error_df: int) -> AnovaRow:
+def tested(source: str, sum_of_squares: float, df: int, error_ms: float, error_df: int) -> AnovaRow:
     """Return a row tested by F against an error mean square; NaN when that error is zero."""
-    f = _ratio(sum_of_squares / df, error_ms)
+    f = ratio(sum_of_squares / df, error_ms)
     return AnovaRow(source, sum_of_squares, df, sum_of_squares / df, f, float(stats.f.sf(f, df, error_df)))
 
 
-def _block(surface: Surface, total_ss: float) -> tuple[AnovaRow, ...]:
+def block_row(observed: FloatArray, block: npt.NDArray[np.int64], total_ss: float) -> tuple[AnovaRow, ...]:
     """Return the row "block", between the means of the blocks and before all terms; untested, as blocks were not drawn
     at random (Box, Hunter and Hunter 2005, ch. 4).
     """
-    if not surface.block_names:
-        return ()
-    counts = np.bincount(surface.block_of_run)
-    means = np.bincount(surface.block_of_run, weights=surface.observed) / counts
-    between = float(counts @ (means - surface.observed.mean()) ** 2) if total_ss > 0 else 0.0
+    counts = np.bincount(block)
+    means = np.bincount(block, weights=observed) / counts
+    between = float(counts @ (means - observed.mean()) ** 2) if total_ss > 0 else 0.0
     df = counts.size - 1
     return (AnovaRow("block", between, df, between / df, math.nan, math.nan),)
 
 
-def _lack_of_fit(surface: Surface, residual_ss: float) -> tuple[AnovaRow, ...]:
+def lack_of_fit(
+    observed: FloatArray, point_of_run: npt.NDArray[np.int64], residual_ss: float, df_residual: int
+) -> tuple[AnovaRow, ...]:
     """Return the rows "lack_of_fit" and "pure_error" as far as they have degrees of freedom.
 
     By hand: in exact replicates what is left of them by rounding must not become an error.
     """
-    counts = np.bincount(surface.point_of_run)
-    means = np.bincount(surface.point_of_run, weights=surface.observed) / counts
-    within = surface.observed - means[surface.point_of_run]
-    within[np.abs(within) <= 8 * np.finfo(np.float64).eps * np.abs(surface.observed)] = 0.0
-    pure_ss, pure_df = float(within @ within), int(surface.observed.size - counts.size)
-    lack_ss, lack_df = max(0.0, residual_ss - pure_ss), int(surface.df_residual - pure_df)
+    counts = np.bincount(point_of_run)
+    means = np.bincount(point_of_run, weights=observed) / counts
+    within = observed - means[point_of_run]
+    within[np.abs(within) <= 8 * np.finfo(np.float64).eps * np.abs(observed)] = 0.0
+    pure_ss, pure_df = float(within @ within), int(observed.size - counts.size)
+    lack_ss, lack_df = max(0.0, residual_ss - pure_ss), int(df_residual - pure_df)
     rows = []
     if lack_df > 0 and pure_df > 0:
-        rows.append(_tested("lack_of_fit", lack_ss, lack_df, pure_ss / pure_df, pure_df))
+        rows.append(tested("lack_of_fit", lack_ss, lack_df, pure_ss / pure_df, pure_df))
     if pure_df > 0:
         rows.append(AnovaRow("pure_error", pure_ss, pure_df, pure_ss / pure_df, math.nan, math.nan))
     return tuple(rows)
@@ -193,7 +194,7 @@ def _press_by_row(surface: Surface, residuals: FloatArray) -> float:
     return total
 
 
-def _externally_studentized(influence: Any, mse: float, df: int) -> FloatArray:
+def externally_studentized(influence: Any, mse: float, df: int) -> FloatArray:
     """Return r_i sqrt((df - 1)/(df - r_i^2)), the residuals by an error that is estimated without run i.
 
     The same as statsmodels' `resid_studentized_external`, which fits the model once per run. NaN where that is not

@@ -8,6 +8,7 @@ from doe.designs.definitive_screening import DefinitiveScreening, definitive_scr
 from doe.designs.design import ALPHAS, ChosenDesign, Design, DesignOptions, Points, factor_letters
 from doe.designs.factorial import Factorial, factorial
 from doe.designs.mixture import Mixture
+from doe.designs.morris import Morris, morris
 from doe.designs.optimal import DOptimal, IOptimal
 from doe.designs.plackett_burman import PlackettBurman, fold_over, interaction_aliases, plackett_burman
 from doe.designs.space_filling import LatinHypercube, Sobol, latin_hypercube, sobol
@@ -26,6 +27,7 @@ DESIGNS: Registry[Design] = Registry(
         Mixture(),
         LatinHypercube(),
         Sobol(),
+        Morris(),
     ),
     instance_of(Design),
 )
@@ -47,6 +49,7 @@ __all__ = [
     "fold_over",
     "interaction_aliases",
     "latin_hypercube",
+    "morris",
     "plackett_burman",
     "sobol",
 ]

@@ -43,6 +43,8 @@ EXACT = {
     "draw_down": READ_OFF,
 }
 """Why a test has no bias; the others weigh."""
+BIASED = ("drop", "rebound", "sieve", "compression", "shear")
+"""Tests whose formula does not give back what was put in."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +59,7 @@ class BiasTable(Record):
 
 def bias_table(test: str) -> BiasTable:
     """The table of a test whose formula does not give back what was put in; LaboratoryError for another one."""
-    tables = {"drop": drop_bias, "rebound": rebound_bias, "sieve": sieve_bias}
-    tables |= {"compression": compression_bias, "shear": shear_bias}
+    tables = dict(zip(BIASED, (drop_bias, rebound_bias, sieve_bias, compression_bias, shear_bias), strict=True))
     if test not in tables:
         exact = EXACT.get(test, "a difference of masses has no model")
         raise LaboratoryError(f"--bias: {test}: {exact}; allowed: {', '.join(tables)}")

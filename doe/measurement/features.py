@@ -55,6 +55,8 @@ PIXELS, CELLS = 4.0, 3
 """Pixels of a height map along the thickness of a body, and cells along a pixel where no scan limits them."""
 FINE = 0.25
 """Resolution up to which a scan shows single bodies, as a share of the diameter of the smallest member sphere."""
+ROUNDING = 1e-12
+"""Share of a length that a quotient of two may be off."""
 PER_RING = 20
 """Radii in a ring over which listed heights are averaged."""
 
@@ -206,7 +208,8 @@ def ring_heights(places: Array, heights: Array, frame: Frame) -> Array:
 def _seen(surface: UpperSurface, condition: Condition, sight: Sight = PERFECT) -> HeightMap:
     cell, times = cells_of(condition)
     pixel = times * cell
-    half_width = pixel * np.ceil(frame_of_scene(condition.scene).half_width / pixel)
+    # A trace less than a whole number of pixels: rounded up in cells, it would else be one cell too many now and then.
+    half_width = (1.0 - ROUNDING) * pixel * np.ceil(frame_of_scene(condition.scene).half_width / pixel)
     return coarsened(without_holes(seen_through(surface.height_map(half_width, cell), sight)), times)
 
 

@@ -7,14 +7,20 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import ClassVar
 
 from doe.audit import Audit, Figure, Status
 from doe.provenance import About
 from explorer.files.run_folder import json_text
+from explorer.files.run_result import versions
+from explorer.report import content
 from explorer.report.content import Banner, Block, Bullets, DataTable, Facts, Folded, Report, Section, Table, Text, Word
+from explorer.report.figures.style import ASSUMPTION, CHOSEN, DUMMY, TARGET, axis, chart, label
 from explorer.report.folder import write_report
 from explorer.report.html import page
+from explorer.report.methods import audit_methods
 from explorer.tables.text_table import text_table
 from explorer.units import MISSING
 
@@ -26,12 +32,36 @@ HEADINGS: dict[Status, str] = {
 }
 REPRODUCED: tuple[Status, ...] = ("reproduced exactly", "only if rounded")
 NOBODY = About()
+COLOURS: dict[Status, str] = {
+    "differs": CHOSEN,
+    "cannot be checked": DUMMY,
+    "only if rounded": ASSUMPTION,
+    "reproduced exactly": TARGET,
+}
+NOWHERE = "no place named"
+ROW = 26
+"""Height of a bar [px]."""
 WHAT = (
     "A figure is reproduced exactly if the recomputed value rounds to the print. The figures of an analysis of "
     "variance are first held against one another, as far as the rounding of each allows, and then against the runs. "
     "What comes out only if the runs, or other inputs, were rounded before they were printed is listed with the slack "
     "that this gives. Everything is recomputed from the publication's own tables; nothing is simulated."
 )
+
+
+@dataclass(frozen=True)
+class AuditResult(Audit):
+    """The content of ``audit.json``: the findings, and who made them and with what."""
+
+    NAME: ClassVar[str] = "audit.json"
+
+    about: About = NOBODY
+    versions: dict[str, str | None] = field(default_factory=dict)
+
+
+def audit_result(audit: Audit, about: About = NOBODY) -> AuditResult:
+    """``audit`` with who made it."""
+    return AuditResult(audit.title, audit.source, audit.figures, audit.remarks, about, versions())
 
 
 def audit_text(audit: Audit) -> str:
@@ -62,17 +92,18 @@ def _listed(heading: str, lines: list[str]) -> str:
 
 def write_audit(audit: Audit, folder: Path, about: About = NOBODY) -> None:
     """Write ``audit.json`` and the report into ``folder``; each appears complete or not at all."""
-    content = audit.to_dict() | ({"about": about.to_dict()} if about.author or about.notes else {})
-    write_report(audit_report(audit, about), folder, {"audit.json": json_text(content) + "\n"})
+    found = audit_result(audit, about)
+    write_report(audit_report(found), folder, {found.NAME: json_text(found.to_dict()) + "\n"})
 
 
 def audit_html(audit: Audit) -> str:
     """The page."""
-    return page(audit_report(audit))
+    return page(audit_report(audit_result(audit)))
 
 
-def audit_report(audit: Audit, about: About = NOBODY) -> Report:
+def audit_report(audit: AuditResult) -> Report:
     """The report of an audit."""
+    methods, references = audit_methods(audit, WHAT, audit.versions)
     figures = DataTable(
         "figures",
         ("where", "figure", "status", "printed", "recomputed", "slack", "how"),
@@ -85,9 +116,10 @@ def audit_report(audit: Audit, about: About = NOBODY) -> Report:
         f"Audit: {audit.title}",
         audit.source or "A published study, recomputed from its own tables",
         banner(audit),
-        audit_sections(audit),
-        about,
+        (*audit_sections(audit), methods),
+        audit.about,
         (figures,),
+        references,
     )
 
 
@@ -116,7 +148,9 @@ def audit_sections(audit: Audit) -> tuple[Section, ...]:
 
 def _sections(audit: Audit) -> Iterator[Section]:
     facts = (("Figures", str(len(audit.figures))), ("Of them", counted(audit)), ("Remarks", str(len(audit.remarks))))
-    yield Section("In short", (Facts(facts), Text(WHAT)))
+    caption = f"n = {len(audit.figures)} figures, each recomputed from the publication’s own tables and graded."
+    shown = (content.Figure("grades", graded(audit), caption),) if audit.figures else ()
+    yield Section("In short", (Facts(facts), Text(WHAT), *shown))
     yield Section("What differs", _table(audit.having("differs"), "How it was recomputed"))
     remarks = tuple(f"{remark.where}: {remark.text}" for remark in audit.remarks)
     yield Section("Remarks", (Bullets(remarks),) if remarks else ())
@@ -124,6 +158,27 @@ def _sections(audit: Audit) -> Iterator[Section]:
     rounded = audit.having("only if rounded")
     yield Section("What is reproduced only if its inputs were rounded", _table(rounded, "How, and with what slack"))
     yield Section("What is reproduced exactly", _reproduced(audit))
+
+
+def graded(audit: Audit) -> content.Spec:
+    """Figures by where they are printed, as bars of their grades, the first place on top."""
+    places = list(dict.fromkeys(figure.where or NOWHERE for figure in audit.figures))
+    counts = Counter((figure.where or NOWHERE, figure.status) for figure in audit.figures)
+    traces = [
+        {
+            "type": "bar",
+            "orientation": "h",
+            "y": list(map(label, places)),
+            "x": [counts[place, status] for place in places],
+            "name": words,
+            "marker": {"color": COLOURS[status]},
+        }
+        for status, words in HEADINGS.items()
+        if any(counts[place, status] for place in places)
+    ]
+    rows = axis("", categoryorder="array", categoryarray=list(map(label, places[::-1])))
+    layout = {"barmode": "stack", "xaxis": axis("printed figures"), "yaxis": rows}
+    return chart(traces, layout, 110 + ROW * len(places))
 
 
 def _table(figures: tuple[Figure, ...], how: str) -> tuple[Block, ...]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from explorer.design.choices import ModelOrder, Reduction
+from explorer.design.choices import ModelOrder, Reduction, Surrogate
 
 
 def analyse(
@@ -19,11 +19,17 @@ def analyse(
     reduce: Reduction | None = typer.Option(
         None, help="Drop terms one by one, factors after their products: by AICc, or while p > 0.05."
     ),
+    surrogate: Surrogate | None = typer.Option(
+        None, help="A Gaussian process beside the polynomial: which predicts better? --target is answered by it."
+    ),
     only: str = typer.Option("", metavar="NAME,…", help="Only these factors; the others count as scatter."),
     block: str = typer.Option("", metavar="NAME", help="Column of days, batches or operators: a fixed effect each."),
+    random: str = typer.Option(
+        "", metavar="NAME", help="Column of groups drawn at random (days, whole plots, seeds): a variance component."
+    ),
     factors: str | None = typer.Option(None, metavar="FILE", help="Factors file, for a sheet that declares none."),
-    out: Path | None = typer.Option(
-        None, metavar="DIR", help="New folder for result.json, the report, its figures and data."
+    report: Path | None = typer.Option(
+        None, "--report", "--out", metavar="DIR", help="New folder for result.json, the report, its figures and data."
     ),
     author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
     notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
@@ -32,14 +38,8 @@ def analyse(
     """Effects, model, analysis of variance, diagnostics, canonical analysis, and the settings that give a target."""
     from explorer.design.analysis import AnalyseOrder, run_analyse
     from explorer.design.text import analysis_text
-    from explorer.errors import CommandError
     from explorer.files.run_folder import json_text
 
-    for option, value in (("--target", target), ("--target-error", target_error)):
-        if value is not None and not abs(value) < float("inf"):
-            raise CommandError(f"{option} {value:g}: allowed: a finite number")
-    if model is not None and terms:
-        raise CommandError("--terms: stands instead of --model; allowed: one of them")
     order = AnalyseOrder(
         sheet=sheet,
         response=response,
@@ -50,15 +50,17 @@ def analyse(
         terms=_names(terms),
         only=_names(only),
         block=block,
+        random=random,
         reduction=reduce,
-        out=out,
+        surrogate=surrogate,
+        out=report,
         author=author,
         notes=notes,
     )
     result = run_analyse(order)
     typer.echo(json_text(result.to_dict()) if json else analysis_text(result))
-    if out is not None and not json:
-        typer.echo(f"\nwrote {out / 'report.html'}, report.md, result.json")
+    if report is not None and not json:
+        typer.echo(f"\nwrote {report / 'report.html'}, report.md, result.json")
 
 
 def _names(text: str) -> tuple[str, ...]:

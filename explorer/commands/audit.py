@@ -17,7 +17,9 @@ def audit(
     json: bool = typer.Option(False, "--json", help="Print every finding as plain data."),
     author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
     notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
-    out: Path | None = typer.Option(None, metavar="DIR", help="Folder for report.html, report.md and audit.json."),
+    report: Path | None = typer.Option(
+        None, "--report", "--out", metavar="DIR", help="New folder for audit.json, the report, its figures and data."
+    ),
 ) -> None:
     """Recompute every figure of a published calibration study that can be recomputed.
 
@@ -31,9 +33,9 @@ def audit(
     from explorer.files.run_result import made_today
 
     found = audit_study(read_study(shipped_study() if folder is None else folder))
-    if out is not None:
-        with appearing(out) as temporary:
+    if report is not None:
+        with appearing(report, "--report") as temporary:
             write_audit(found, temporary, made_today(author, notes))
     typer.echo(json_text(found.to_dict()) if json else audit_text(found))
-    if out is not None:
-        typer.echo(f"{out}/report.html, report.md, audit.json", err=True)
+    if report is not None:
+        typer.echo(f"{report}/report.html, report.md, audit.json", err=True)

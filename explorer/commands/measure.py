@@ -23,13 +23,18 @@ def measure(
     baseline: str = typer.Option(
         "auto", metavar="auto|Y0,Y1", help="Plate in px from the top, at the left and the right edge of the picture."
     ),
+    checkerboard: str | None = typer.Option(
+        None, metavar="PHOTO", help="A printed checkerboard by the same camera: its corners tell the lens, taken out."
+    ),
     json: bool = typer.Option(False, "--json", help="Print plain data, with the profiles, and nothing else."),
     plot: Path | None = typer.Option(None, metavar="FILE.png", help="New file: the pictures with what was read."),
     outline: Path | None = typer.Option(
         None, metavar="FILE.csv", help="New file: the outline, for the page to lay over a simulated pile."
     ),
     target: Path | None = typer.Option(
-        None, metavar="DIR", help="Keep the pictures in this folder, for `calibrate --target`; others there stay."
+        None,
+        metavar="DIR|STUDY.toml",
+        help="Keep the pictures in this folder, for `calibrate --target`; or write mean, SD and n into this study.",
     ),
     report: Path | None = typer.Option(None, metavar="DIR", help="New folder for the report, its figures and data."),
     author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
@@ -44,13 +49,28 @@ def measure(
 
     Exit code 1 where a picture shows no pile that could be read; the line says why.
     """
+    from doe.studies.study import load_study
+    from explorer.errors import CommandError
     from explorer.files.run_folder import appearing, check_vacant, json_text
     from explorer.photograph.run import measure_order, run_measure
+    from explorer.photograph.target import check_targets, keep_target, write_into_study
     from explorer.tables.photograph import measure_result, measure_text, refusal_lines
 
-    order = measure_order(photos, scale, reference_length, reference, baseline, plot, outline, from_simulation)
+    order = measure_order(
+        photos, scale, reference_length, reference, baseline, plot, outline, from_simulation, checkerboard
+    )
     if report is not None:
         check_vacant(report, "--report")
+    study = target if target is not None and target.suffix == ".toml" and not target.is_dir() else None
+    if target is not None and study is None and checkerboard is not None:
+        raise CommandError(
+            "--target DIR: its pictures are read again without --checkerboard; leave one of the two out, or name a "
+            "STUDY.toml"
+        )
+    if study is not None:
+        if not study.is_file():
+            raise CommandError(f"--target {study}: no such study; `explorer new study NAME` writes one")
+        check_targets(load_study(str(study)).targets)
     measured = run_measure(order)
     if report is not None:
         from explorer.report.folder import write_report
@@ -61,9 +81,12 @@ def measure(
         with appearing(report, "--report") as folder:
             write_report(photograph_report(result, read_picture(order, measured)), folder, {result.NAME: text})
     if target is not None and not measured.refusals:
-        from explorer.photograph.target import keep_target
-
-        typer.echo(f"{target}: {keep_target(target, order.pictures, measured).line}", err=json)
+        line = (
+            write_into_study(study, order.pictures, measured)
+            if study is not None
+            else f"{target}: {keep_target(target, order.pictures, measured).line}"
+        )
+        typer.echo(line, err=json)
     if json:
         typer.echo(json_text(measure_result(measured)))
     else:

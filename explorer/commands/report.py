@@ -9,24 +9,27 @@ import typer
 
 def report(
     folders: list[Path] = typer.Argument(
-        metavar="FOLDER...", help="Of calibrate, diagnose, analyse --out, lab --report or measure --report."
+        metavar="FOLDER...",
+        help="Of calibrate, diagnose, or --report of another command; or a project, for all of its.",
     ),
     out: Path = typer.Option(..., metavar="DIR", help="New folder for the report, its figures and data."),
     title: str = typer.Option("", metavar="TEXT", help="Of the report; that of the last stage if not given."),
     author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
     notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
 ) -> None:
-    """Join photographs, bench tests, designs, calibration and diagnosis in one report.
+    """Join an audit, photographs, bench tests, designs, calibration and diagnosis in one report.
 
     Of one folder the report is made again, with today's figures.
     """
     from explorer.files.run_folder import appearing, check_vacant
     from explorer.files.run_result import made_today
     from explorer.report.folder import write_report
-    from explorer.report.project import project_report
+    from explorer.report.project import finished_folders, project_report
 
     check_vacant(out)
-    made = project_report(folders, title, made_today(author, notes))
+    made = project_report(
+        [one for folder in folders for one in finished_folders(folder)], title, made_today(author, notes)
+    )
     with appearing(out) as folder:
         missing = write_report(made, folder)
     typer.echo(f"{out}/report.html, report.md")

@@ -11,14 +11,21 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from doe.analysis.analyse import DesignAnalysis, ResponseTarget, analyse_design
+from doe.analysis.analyse import DesignAnalysis, analyse_design, reduction_words
+from doe.analysis.elementary_effects import elementary_effects
+from doe.analysis.gaussian_process import fit_process, process_target
 from doe.analysis.mixture import MixtureOrder, fit_mixture
 from doe.analysis.models import ORDERS, Order
+from doe.analysis.named_factors import MOST_SOLVED, fit_named
+from doe.analysis.optimum import ResponseTarget
+from doe.analysis.random_groups import fit_random
 from doe.analysis.steepest_ascent import Region
+from doe.analysis.surface import Blocks
 from doe.analysis.surface_anova import FULL
 from doe.designs import DESIGNS, factor_letters
+from doe.designs.morris import Morris
 from doe.errors import StatisticsError
-from explorer.design.choices import ModelOrder, Reduction
+from explorer.design.choices import ModelOrder, Reduction, Surrogate
 from explorer.design.factors_file import read_factors, region_of
 from explorer.design.filled_sheet import Runs, read_sheet, runs_of
 from explorer.design.result import DesignResult, Response, RunCount, SheetFactor
@@ -55,7 +62,10 @@ class AnalyseOrder:
     only: tuple[str, ...] = ()
     block: str = ""
     """Column of the block in which each run was made."""
+    random: str = ""
+    """Column of the group, drawn at random, in which each run was made."""
     reduction: Reduction | None = None
+    surrogate: Surrogate | None = None
     out: Path | None = field(default=None)
     author: str = ""
     notes: str = ""
@@ -66,11 +76,22 @@ def run_analyse(order: AnalyseOrder) -> DesignResult:
     from explorer.report.design import design_report
     from explorer.report.folder import write_report
 
+    for option, value in (("--target", order.target), ("--target-error", order.target_error)):
+        if value is not None and not abs(value) < math.inf:
+            raise CommandError(f"{option} {value:g}: allowed: a finite number")
+    if order.target_error < 0:
+        raise CommandError(f"--target-error {order.target_error:g}: allowed: 0 and more")
+    if order.order is not None and order.terms:
+        raise CommandError("--terms: stands instead of --model; allowed: one of them")
     path = asset_path("runs", order.sheet)
     factors = read_factors(asset_path("designs", order.factors)).factors if order.factors else ()
     sheet = read_sheet(path, factors)
-    responses = [name for name in sheet.responses if name not in (order.block, BLOCK) and not sheet.is_words(name)]
-    runs = runs_of(sheet, order.response or _only_response(sheet.path, responses), order.only, order.block)
+    responses = [
+        name for name in sheet.responses if name not in (order.block, order.random, BLOCK) and not sheet.is_words(name)
+    ]
+    runs = runs_of(
+        sheet, order.response or _only_response(sheet.path, responses), order.only, order.block, order.random
+    )
     result = analyse_runs(runs, order)
     if order.out is not None:
         with appearing(order.out) as folder:
@@ -81,17 +102,24 @@ def run_analyse(order: AnalyseOrder) -> DesignResult:
 def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
     """The analysis of one response."""
     region = region_of(runs.factors)
-    named = [factor for factor in runs.factors if factor.levels]
-    if named and order.target is not None:
-        raise CommandError(
-            f"--target: {named[0].name} is no number, and has no settings between its levels; "
-            "allowed: the runs of one level in a sheet of their own"
-        )
-    if _whole(runs, region):
+    asked_model = order.order or order.terms or order.reduction or order.surrogate
+    if order.surrogate is not None:
+        _refuse_surrogate(runs, order)
+    if runs.groups is not None:
+        found = _random(runs, region, order, runs.groups)
+        return _result(runs, order, replace(found, notes=tuple(_run_notes(runs, region, found))))
+    if runs.design == Morris.name and not (asked_model or order.target is not None or order.block):
+        found = _elementary(runs, region, order)
+        return _result(runs, order, replace(found, notes=(*found.notes, *_run_notes(runs, region, found))))
+    if _whole(runs, region) and order.surrogate is None:
         return _result(runs, order, _mixture(runs, region, order))
-    _refuse_dependent(runs, region, order.sheet)
     reference = np.array([factor.reference for factor in runs.factors])
     target = None if order.target is None else ResponseTarget(order.target, order.target_error, reference)
+    most_names = max(len(factor.levels) for factor in runs.factors)
+    if most_names > 2 or (most_names and target is not None and order.surrogate is None):
+        found = _named(runs, region, order, target)
+        return _result(runs, order, replace(found, notes=(*found.notes, *_run_notes(runs, region, found))))
+    _refuse_dependent(runs, region, order.sheet)
     try:
         found = analyse_design(
             runs.coded,
@@ -99,13 +127,30 @@ def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
             region,
             _order(runs, order),
             _symbols(runs, order.terms),
-            target,
+            target if order.surrogate is None else None,
             runs.blocks,
             None if order.reduction is None else order.reduction.value,
         )
+        if order.surrogate is not None:
+            process = fit_process(runs.coded, runs.responses, region)
+            answer = None if target is None else process_target(process, target)
+            found = replace(found, surrogate=process, surrogate_target=answer)
     except StatisticsError as error:
         raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
     return _result(runs, order, replace(found, notes=(*found.notes, *_run_notes(runs, region, found))))
+
+
+def _refuse_surrogate(runs: Runs, order: AnalyseOrder) -> None:
+    """A Gaussian process has no groups, and no distance between three names."""
+    for option, given in {"--block": runs.blocks, "--random": runs.groups}.items():
+        if given is not None:
+            raise CommandError(f"--surrogate {order.surrogate}: has no groups of runs; allowed: without {option}")
+    for factor in runs.factors:
+        if factor.levels:
+            others = ",".join(other.name for other in runs.factors if not other.levels)
+            raise CommandError(
+                f"--surrogate {order.surrogate}: {factor.name} is no number; allowed: factors that are, --only {others}"
+            )
 
 
 def _result(runs: Runs, order: AnalyseOrder, analysis: DesignAnalysis) -> DesignResult:
@@ -163,6 +208,63 @@ def _mixture(runs: Runs, region: Region, order: AnalyseOrder) -> DesignAnalysis:
     return DesignAnalysis((), None, None, None, (note,), mixture=found)
 
 
+def _elementary(runs: Runs, region: Region, order: AnalyseOrder) -> DesignAnalysis:
+    """The elementary effects of a Morris design; a model of the same runs has to be asked for."""
+    try:
+        found = elementary_effects(runs.coded, runs.responses, region.names)
+    except StatisticsError as error:
+        raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
+    note = "Elementary effects; --model linear, a target or --surrogate gp fits a model to the same runs."
+    return DesignAnalysis((), None, None, None, (note,), elementary=found)
+
+
+def _random(runs: Runs, region: Region, order: AnalyseOrder, groups: Blocks) -> DesignAnalysis:
+    """The model with groups that are drawn at random; raises CommandError for what is not for one."""
+    for option, given in {"--target": order.target is not None, "--reduce": order.reduction}.items():
+        if given:
+            raise CommandError(f"{option}: is not for --random {order.random}; allowed: --block {order.random}")
+    try:
+        found = fit_random(
+            runs.coded,
+            runs.responses,
+            region,
+            [factor.levels for factor in runs.factors],
+            groups,
+            _order(runs, order),
+            _symbols(runs, order.terms),
+            runs.blocks,
+        )
+    except StatisticsError as error:
+        raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
+    return DesignAnalysis((), None, None, None, (), random=found)
+
+
+def _named(runs: Runs, region: Region, order: AnalyseOrder, target: ResponseTarget | None) -> DesignAnalysis:
+    """The model of factors that are names, beside those that are numbers."""
+    try:
+        found = fit_named(
+            runs.coded,
+            runs.responses,
+            region,
+            [factor.levels for factor in runs.factors],
+            _order(runs, order),
+            _symbols(runs, order.terms),
+            target,
+            runs.blocks,
+            None if order.reduction is None else order.reduction.value,
+        )
+    except StatisticsError as error:
+        raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
+    notes = [] if found.reduced is None else [reduction_words(found.reduced)]
+    numbers = sum(not names for names in found.levels)
+    if target is not None and numbers > MOST_SOLVED:
+        notes.append(
+            f"The settings that give a target are searched for up to {MOST_SOLVED} numbers, not {numbers}: analyse the "
+            "factors that act alone."
+        )
+    return DesignAnalysis((), None, None, None, tuple(notes), named=found)
+
+
 def _refuse_dependent(runs: Runs, region: Region, sheet: str) -> None:
     """Raise CommandError where the levels of the valid runs do not tell the factors apart, and name those."""
     valid = ~np.isnan(runs.responses).all(axis=1)
@@ -197,7 +299,7 @@ def _run_notes(runs: Runs, region: Region, found: DesignAnalysis) -> list[str]:
     row, replicate = np.nonzero(~np.isnan(runs.responses))
     labels, notes = _labels(runs), []
     for factor in runs.factors:
-        if factor.levels:
+        if factor.levels and found.named is None and len(factor.levels) == 2:
             notes.append(f"{factor.name}: −1 is {factor.levels[0]}, +1 is {factor.levels[1]}.")
     for label, k in zip(labels, row, strict=True):
         for factor, coded, level in zip(runs.factors, runs.coded[k], region.natural(runs.coded[k]), strict=True):
@@ -206,11 +308,13 @@ def _run_notes(runs: Runs, region: Region, found: DesignAnalysis) -> list[str]:
                     f"{label}: {factor.name} is {level:.6g}, {abs(coded):.1f} half-widths from the middle of "
                     f"{factor.low:g} … {factor.high:g}: a slip? One such level decides the whole model."
                 )
-    if runs.grouping and runs.blocks is None:
+    if runs.grouping and runs.blocks is None and runs.groups is None:
         notes.append(
             f"Not used: {', '.join(runs.grouping)}. A column that says on which day, from which batch or by whom a run "
             "was made goes into --block."
         )
+    if found.named is not None and runs.place.size:
+        notes += _drift(runs.place[row, replicate], found.named.observed - found.named.predicted)
     if found.model is not None:
         model = found.model.surface
         if runs.place.size:
@@ -339,7 +443,9 @@ def _command(order: AnalyseOrder) -> tuple[str, ...]:
         ("--terms", order.terms, ",".join),
         ("--only", order.only, ",".join),
         ("--block", order.block, str),
+        ("--random", order.random, str),
         ("--reduce", order.reduction, str),
+        ("--surrogate", order.surrogate, str),
     ]
     for option, value, write in options:
         if value is not None and value not in ("", ()):

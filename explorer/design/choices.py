@@ -1,9 +1,17 @@
-"""Names that the command line of a design offers: axial points, orders of the model.
+"""What the command line of a design offers, and the page with it: axial points, orders of the model, limits of numbers.
 
 In a file without NumPy, so that `--help` does not wait for it.
 """
 
+from collections.abc import Mapping
 from enum import StrEnum
+
+FEWEST: Mapping[str, int] = {
+    "runs": 2, "replicates": 1, "centre": 0, "blocks": 2, "fraction": 0, "lattice": 1, "seed": 0,
+}  # fmt: skip
+"""Field of a ``DesignOrder`` → its least whole number."""
+MOST: Mapping[str, int] = {"replicates": 1000, "centre": 1000, "blocks": 512, "lattice": 50}
+"""Field → its largest, where that does not depend on the design."""
 
 
 class Alpha(StrEnum):
@@ -19,6 +27,12 @@ class Reduction(StrEnum):
 
     AICC = "aicc"
     P = "p"
+
+
+class Surrogate(StrEnum):
+    """Models without terms that are set beside the polynomial."""
+
+    GP = "gp"
 
 
 class ModelOrder(StrEnum):

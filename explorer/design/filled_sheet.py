@@ -190,26 +190,22 @@ class Runs:
     """When each run was made, (rows, replicates): its number in the column "run", else its place in the file."""
     blocks: Blocks | None = None
     """In which each run was made; None where no column says."""
+    groups: Blocks | None = None
+    """The same of groups that are drawn at random."""
     grouping: tuple[str, ...] = ()
     """Columns without a use whose cells repeat, as those of days, batches or operators do."""
 
 
-def runs_of(sheet: Sheet, response: str, only: Sequence[str] = (), block: str = "") -> Runs:
-    """The runs of one response, with all factors or with ``only`` some, and in the blocks of a column.
+def runs_of(sheet: Sheet, response: str, only: Sequence[str] = (), block: str = "", random: str = "") -> Runs:
+    """The runs of one response, with all factors or with ``only`` some, and in the blocks and random groups of columns.
 
     Raises CommandError as `read_sheet` does.
     """
     factors = _kept(sheet, only)
-    for factor in factors:
-        if len(factor.levels) > 2:
-            others = ",".join(other.name for other in factors if len(other.levels) < 3)
-            raise CommandError(
-                f"{sheet.path}: {factor.name} has {len(factor.levels)} levels that are no numbers; "
-                f"allowed: its effect beside the model of the others, --only {others} --block {factor.name}"
-            )
-    if block and (block not in sheet.columns or block == response or block in [factor.name for factor in factors]):
-        offered = ", ".join(name for name in sheet.responses if name != response) or "none"
-        raise CommandError(f"{sheet.path}: --block {block}: no column of blocks; the other columns are {offered}")
+    for option, column in (("--block", block), ("--random", random)):
+        if column and (column not in sheet.columns or column in (response, *(factor.name for factor in factors))):
+            offered = ", ".join(name for name in sheet.responses if name != response) or "none"
+            raise CommandError(f"{sheet.path}: {option} {column}: no column of blocks; the other columns are {offered}")
     _check_words(sheet, response)
     if response not in sheet.responses:
         offered = ", ".join(sheet.responses) or "none"
@@ -224,15 +220,13 @@ def runs_of(sheet: Sheet, response: str, only: Sequence[str] = (), block: str = 
     width = max(map(len, rows))
     responses = np.full((len(rows), width), np.nan)
     labels = [[""] * width for _ in rows]
-    names = _block_names(sheet, block, [int(used[member]) for members in rows for member in members])
-    in_block, place = np.zeros((len(rows), width), dtype=np.int64), np.zeros((len(rows), width), dtype=np.int64)
+    place = np.zeros((len(rows), width), dtype=np.int64)
+    positions = [used[members] for members in rows]
     for row, members in enumerate(rows):
         for replicate, member in enumerate(members):
             responses[row, replicate] = values[used[member]]
             labels[row][replicate] = _label(sheet, int(used[member]))
             place[row, replicate] = _place(sheet, int(used[member]))
-            if block:
-                in_block[row, replicate] = names.index(sheet.cells[used[member]][sheet.columns[block]])
     return Runs(
         design=sheet.design,
         factors=factors,
@@ -242,9 +236,12 @@ def runs_of(sheet: Sheet, response: str, only: Sequence[str] = (), block: str = 
         responses=responses,
         labels=tuple(map(tuple, labels)),
         missing=sum(map(math.isnan, values)),
-        blocks=Blocks(names, in_block) if block else None,
+        blocks=_blocks(sheet, block, positions, width),
+        groups=_blocks(sheet, random, positions, width),
         place=place,
-        grouping=tuple(name for name in sheet.responses if name not in (response, block) and _groups(sheet, name)),
+        grouping=tuple(
+            name for name in sheet.responses if name not in (response, block, random) and _groups(sheet, name)
+        ),
     )
 
 
@@ -269,14 +266,22 @@ def finished_runs(sheet: Sheet, responses: Sequence[str]) -> tuple[Array, tuple[
     return _snapped(region_of(sheet.factors).coded(natural)), tuple(cells)
 
 
-def _block_names(sheet: Sheet, block: str, positions: Sequence[int]) -> tuple[str, ...]:
-    """What the blocks of the runs at ``positions`` are called, in the order of the sheet."""
-    if not block:
-        return ()
-    for position in positions:
-        if sheet.cells[position][sheet.columns[block]] in EMPTY_CELLS:
-            raise CommandError(f"{sheet.path}, line {sheet.lines[position]}, column {block}: is empty; allowed: a name")
-    return tuple(dict.fromkeys(sheet.cells[position][sheet.columns[block]] for position in sorted(positions)))
+def _blocks(sheet: Sheet, column: str, rows: Sequence[npt.NDArray[np.int64]], width: int) -> Blocks | None:
+    """In which block each run at the positions of the rows was made, by a column; None for no column."""
+    if not column:
+        return None
+    place = sheet.columns[column]
+    every = sorted(int(position) for row in rows for position in row)
+    for position in every:
+        if sheet.cells[position][place] in EMPTY_CELLS:
+            raise CommandError(
+                f"{sheet.path}, line {sheet.lines[position]}, column {column}: is empty; allowed: a name"
+            )
+    names = tuple(dict.fromkeys(sheet.cells[position][place] for position in every))
+    of_run = np.zeros((len(rows), width), dtype=np.int64)
+    for row, positions in enumerate(rows):
+        of_run[row, : len(positions)] = [names.index(sheet.cells[position][place]) for position in positions]
+    return Blocks(names, of_run)
 
 
 def _check_words(sheet: Sheet, response: str) -> None:

@@ -85,6 +85,22 @@ class DesignResult(Document):
     about: About = field(default_factory=About)
 
     @property
+    def names(self) -> tuple[tuple[str, ...], ...]:
+        """The names of each factor, () of a number, in a model that tells them apart."""
+        found = self.analysis.named or self.analysis.random
+        return found.levels if found is not None else ((),) * len(self.factors)
+
+    def levels_of(self, row: int) -> tuple[float | str, ...]:
+        """The levels of a row of the design: numbers in the units of their factors, and names."""
+        names = self.names
+        return tuple(
+            own[round((coded + 1) / 2 * (len(own) - 1))]
+            if own
+            else (float(factor.low) + float(factor.high)) / 2 + (float(factor.high) - float(factor.low)) / 2 * coded
+            for factor, own, coded in zip(self.factors, names, self.coded[row].tolist(), strict=True)
+        )
+
+    @property
     def effects(self) -> DrawnEffects | None:
         """The effects of a two-level design; None of any other."""
         found = self.analysis.effects

@@ -218,6 +218,14 @@ def _first(*values: int | None) -> int:
     return next(value for value in values if value is not None)
 
 
+def sheet_content(plan: RunPlan, file: FactorsFile, workbook: bool, decimal_comma: bool) -> bytes:
+    """The empty sheet as a file: a workbook (.xlsx), or CSV."""
+    if workbook:
+        return sheet_workbook(plan, file)
+    # Without the mark at its head a spreadsheet takes the file's letters for Windows's.
+    return ("\ufeff" * decimal_comma + sheet_text(plan, file, decimal_comma)).encode()
+
+
 def sheet_text(plan: RunPlan, file: FactorsFile, decimal_comma: bool = False) -> str:
     """The empty sheet as CSV; with decimal commas, semicolons are between the cells, as spreadsheets have it there."""
     comments, rows = _sheet(plan, file)

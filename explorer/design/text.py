@@ -19,7 +19,10 @@ from doe.record import plain
 from explorer.design.factors_file import DesignFactor, FactorsFile, region_of
 from explorer.design.result import DesignResult
 from explorer.design.run_plan import RunPlan
+from explorer.errors import CommandError
 from explorer.report.content import Facts, Table
+from explorer.report.design.elementary import elementary_table
+from explorer.report.design.groups import components_table, estimates_table, tests_table
 from explorer.report.design.model import (
     curvature,
     diagnostics,
@@ -28,10 +31,22 @@ from explorer.report.design.model import (
     fit_summary,
     mixture_table,
 )
+from explorer.report.design.names import groups_table, means_table
 from explorer.report.design.sections import factor_table, in_short, settings_table, shape, target
+from explorer.report.design.surrogate import errors_table, lengths_table, process_settings
 from explorer.report.sections.surface import anova_table, variance_table
 from explorer.tables.text_table import text_table
 from explorer.units import enumeration, number
+
+TERMS = {"factor": "of a factor", "interaction": "of an interaction", "square": "curvature, centre → end"}
+"""Kind of a term → the change that it is, in words."""
+
+
+def check_power(sigma: float | None, effect: float | None) -> None:
+    """Refuse what is neither the standard deviation of a run nor a change of its result."""
+    for option, value in (("--sigma", sigma), ("--effect", effect)):
+        if value is not None and not 0 < value < math.inf:
+            raise CommandError(f"{option} {value:g}: allowed: a positive number")
 
 
 def plan_result(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: float | None) -> dict[str, Any]:
@@ -52,8 +67,8 @@ def plan_result(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: f
         **({"block": (plan.block + 1).tolist()} if len(plan.block) else {}),
         "aliases": list(plan.points.aliases),
         **({} if plan.points.efficiency is None else _optimal_result(plan)),
-        "model": None if _many_names(file) else planned_order(plan),
-        "power": [] if _many_names(file) else plain(list(_power(plan, sigma, effect))),
+        "model": planned_order(plan, file),
+        "power": plain(list(planned_power(plan, file, sigma, effect))),
     }
 
 
@@ -80,8 +95,8 @@ def plan_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: flo
                 for letter, f in zip(letters, file.factors, strict=True)
             ],
         ),
-        *_beyond(plan, file),
-        *_blocks(plan),
+        *beyond(plan, file),
+        *blocks(plan),
     ]
     if plan.points.aliases:
         lines = "\n".join(plan.points.aliases)
@@ -98,7 +113,7 @@ def _range(factor: DesignFactor) -> list[str]:
     return [number(factor.low, 6), number(factor.high, 6), factor.unit or "1"]
 
 
-def _beyond(plan: RunPlan, file: FactorsFile) -> list[str]:
+def beyond(plan: RunPlan, file: FactorsFile) -> list[str]:
     """A sentence about runs beyond low … high, which a laboratory may not be able to make."""
     if plan.finished or np.abs(plan.coded).max() <= 1 + 1e-9:
         return []
@@ -110,7 +125,7 @@ def _beyond(plan: RunPlan, file: FactorsFile) -> list[str]:
     return [f"The axial runs go beyond low … high: {enumeration(ends)}. --alpha inscribed keeps them within."]
 
 
-def _blocks(plan: RunPlan) -> list[str]:
+def blocks(plan: RunPlan) -> list[str]:
     """A sentence about the blocks: their sizes, in the order in which they are run."""
     if not len(plan.block):
         return []
@@ -124,7 +139,7 @@ def _power_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: f
         return _mixture_text(plan)
     if _many_names(file):
         return "What it will see is not told for a factor of three names and more."
-    found = _power(plan, sigma, effect)
+    found = planned_power(plan, file, sigma, effect)
     if not found:
         return (
             "As many effects as runs: nothing is left for the error. Effects can be held against Lenth's margin alone; "
@@ -134,9 +149,7 @@ def _power_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: f
     header = ["change, low → high", "terms", "standard error", "seen with chance 0.8", "for all at once"]
     rows = [
         [
-            {"factor": "of a factor", "interaction": "of an interaction", "square": "curvature, centre → end"}[
-                one.kind
-            ],
+            TERMS[one.kind],
             str(one.terms),
             *(number(value) for value in (one.standard_error, one.smallest, one.smallest_of_all)),
             *([number(one.power)] if effect else []),
@@ -145,7 +158,7 @@ def _power_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: f
     ]
     table = text_table([*header, f"chance to see {number(effect)}"] if effect else header, rows)
     return (
-        f"what the {planned_order(plan)} model will see at p < 0.05, in {unit} "
+        f"what the {planned_order(plan, file)} model will see at p < 0.05, in {unit} "
         f"({found[0].df} degrees of freedom for the error):\n{table}"
     )
 
@@ -161,8 +174,12 @@ def _mixture_text(plan: RunPlan) -> str:
     return f"The runs bear Scheffé's {order} polynomial ({terms} terms), with {df} degrees of freedom for the error."
 
 
-def planned_order(plan: RunPlan) -> Order | None:
-    """The model that the runs bear beside their blocks; None where they leave no error even for the linear one."""
+def planned_order(plan: RunPlan, file: FactorsFile) -> Order | None:
+    """The model that the runs bear beside their blocks; None where they leave no error even for the linear one, and
+    with a factor of three names and more.
+    """
+    if _many_names(file):
+        return None
     letters = factor_letters(plan.coded.shape[1])
     runs, values = plan.coded[plan.sequence[:, 0]], np.zeros((len(plan.sequence), 1))
     blocks = None
@@ -175,8 +192,11 @@ def planned_order(plan: RunPlan) -> Order | None:
     return highest_order(runs, values, letters, blocks=blocks)
 
 
-def _power(plan: RunPlan, sigma: float | None, effect: float | None) -> tuple[TermPrecision, ...]:
-    order = planned_order(plan)
+def planned_power(
+    plan: RunPlan, file: FactorsFile, sigma: float | None, effect: float | None
+) -> tuple[TermPrecision, ...]:
+    """What the runs will tell of each kind of the model's terms, in units of sigma where that is not known."""
+    order = planned_order(plan, file)
     if order is None:
         return ()
     letters = factor_letters(plan.coded.shape[1])
@@ -199,6 +219,20 @@ def analysis_text(result: DesignResult) -> str:
         parts += [_table(fit_summary(found)), _table(anova_table(found.model.anova))]
     if found.mixture is not None:
         parts += [_table(mixture_table(result, found.mixture)), _table(variance_table(found.mixture.rows))]
+    if found.named is not None:
+        parts += [_table(variance_table(found.named.rows, "")), _table(means_table(result, found.named.means))]
+        parts.append(_table(groups_table(result, found.named)))
+    if found.random is not None:
+        parts += [_table(components_table(result, found.random)), _table(tests_table(found.random))]
+        parts.append(_table(estimates_table(found.random)))
+        if found.random.means:
+            parts.append(_table(means_table(result, found.random.means)))
+    if found.surrogate is not None:
+        parts += [_table(errors_table(result, found.surrogate)), _table(lengths_table(result, found.surrogate))]
+    if found.surrogate_target is not None:
+        parts.append(_table(process_settings(result, found.surrogate_target)))
+    if found.elementary is not None:
+        parts.append(_table(elementary_table(result, found.elementary)))
     told: set[str] = set()
     for section in (in_short(result), diagnostics(result), shape(result), target(result)):
         if section is not None:

@@ -84,10 +84,10 @@ def write_next(folder: Path, source: Path, measurement: Measurement, suggestion:
     entry = _changed_entry(given, name, measurement, suggestion, changed)
     title = f"{measurement.title or source.name}: follow-up, {change}"
     folder.mkdir(parents=True, exist_ok=True)
-    material = _copied_material(str(given.get("material", table["material"])), source, folder)
+    material = copied_material(str(given.get("material", table["material"])), source, folder)
     top = {"format": 1, "title": title, "material": material}
     tables = {"parameters": _parameters(table, measurement), "uncertainty": _uncertainty(table, condition)}
-    write_whole(folder / FILE, _measurement_toml(top, tables, entry))
+    write_whole(folder / FILE, measurement_toml(top, tables, entry))
     write_whole(folder / f"{name}.csv", _empty_table(condition, suggestion.pours))
     if any(one.surfaces for one in measurement.conditions):
         (folder / "scans").mkdir()
@@ -227,7 +227,7 @@ def _uncertainty(table: Settings, condition: Condition) -> dict[str, Any]:
     }
 
 
-def _copied_material(name: str, source: Path, folder: Path) -> str:
+def copied_material(name: str, source: Path, folder: Path) -> str:
     """What the new file calls the material: its copy in ``folder``, or the name of a shipped one."""
     own = source / Path(name).expanduser()
     if not own.is_file():
@@ -262,7 +262,8 @@ def _named_files(table: Settings) -> Iterator[tuple[str, bool]]:
         yield str(table["rig"]["mesh"]), False
 
 
-def _measurement_toml(top: Mapping[str, Any], tables: Mapping[str, Any], entry: Mapping[str, Any]) -> str:
+def measurement_toml(top: Mapping[str, Any], tables: Mapping[str, Any], entry: Mapping[str, Any]) -> str:
+    """measurement.toml of the keys ``top``, further ``tables`` and the one condition ``entry``."""
     parts = {"": top} | {f"[{name}]\n": table for name, table in tables.items() if table}
     parts["[[condition]]\n"] = {key: item for key, item in entry.items() if not isinstance(item, dict)}
     parts |= {f"[condition.{toml_key(key)}]\n": item for key, item in entry.items() if isinstance(item, dict)}

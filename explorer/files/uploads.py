@@ -53,6 +53,18 @@ def kept_file(name: str, content: bytes, folder: Path, suffixes: Sequence[str]) 
     return path
 
 
+@contextmanager
+def read_once(name: str, content: bytes) -> Iterator[Path]:
+    """The file ``content``, of any kind, for as long as it is read; CommandError names it as the person does."""
+    if not 0 < len(content) <= MOST_FILE_BYTES:
+        raise CommandError(f"{name[:80]}: {len(content)} bytes; allowed: up to {MOST_FILE_BYTES}")
+    with tempfile.TemporaryDirectory() as apart:
+        path = Path(apart) / ".".join(label(part) for part in Path(name).name[:80].split("."))
+        path.write_bytes(content)
+        with named(name, path):
+            yield path
+
+
 def unpacked_measurement(name: str, content: bytes, folder: Path) -> Path:
     """The measured data set in the archive ``content``, unpacked into a folder within ``folder`` and read once.
 

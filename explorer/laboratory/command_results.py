@@ -22,23 +22,30 @@ from PIL import Image
 
 from doe.audit import audit_study
 from doe.laboratory.analysis import template_of
+from doe.table_file import WORKBOOK
 from doe.target import Target
 from explorer.audit.read_study import read_study, shipped_study
 from explorer.audit.report import audit_html, audit_text
 from explorer.background.command_output import command_output, kept_scene
 from explorer.design.analysis import AnalyseOrder, run_analyse
+from explorer.design.choices import Alpha
 from explorer.design.factors_file import read_factors
-from explorer.design.run_plan import DesignOrder, make_plan, sheet_text
-from explorer.design.text import analysis_text, plan_text
+from explorer.design.run_plan import DesignOrder, make_plan, sheet_content
+from explorer.design.text import analysis_text, check_power, plan_text
 from explorer.files.run_folder import json_text
+from explorer.files.run_result import made_today
 from explorer.laboratory.part import part_table
-from explorer.laboratory.run import LabOrder, analysed, part_file
+from explorer.laboratory.run import LabOrder, analysed, files_of, part_file
+from explorer.measured.folder import NewCondition, write_condition, written_text
+from explorer.measured.readings import Brought
 from explorer.photograph.annotated import sheet
 from explorer.photograph.run import MeasuredPhotographs, MeasureOrder, measure_order, outline_text, run_measure
 from explorer.photograph.target import PhotographedTarget, check_targets, keep_target
-from explorer.report.bench import bench_charts, curve_charts
+from explorer.report.bench import bench_record, bench_report
 from explorer.report.design import design_html
 from explorer.report.design.charts import design_plots
+from explorer.report.figures.bench import bench_charts, curve_charts
+from explorer.report.html import page
 from explorer.report.study_charts import Plot, Plots
 from explorer.scene.source import command_line, rig_source
 from explorer.tables.laboratory import lab_text
@@ -104,10 +111,11 @@ def bench_result(order: LabOrder) -> CommandResult:
     """`explorer lab`: readings → parameters."""
     result = analysed(order)
     plots: Plots = {title: Plot(partial(dict, spec), PART) for title, spec in curve_charts(result).items()}
-    part = part_file(result, part_table(result)).encode()
-    return CommandResult(
-        lab_text(result), shlex.join(["explorer", *lab_words(order)]), plots, {f"{order.test}.toml": part}
-    )
+    files = {
+        f"{order.test}.toml": part_file(result, part_table(result)).encode(),
+        "report.html": page(bench_report(bench_record(result, made_today("", ""), files_of(order)))).encode(),
+    }
+    return CommandResult(lab_text(result), shlex.join(["explorer", *lab_words(order)]), plots, files)
 
 
 def twin_result(order: LabOrder) -> CommandResult:
@@ -200,28 +208,87 @@ def measure_words(read: PhotographReading) -> list[str]:
     return words
 
 
-def sheet_result(order: DesignOrder, factors: str, sigma: float | None) -> CommandResult:
+def measured_data_result(folder: Path, asked: NewCondition, brought: Brought) -> CommandResult:
+    """`explorer new measurement`: the condition ``asked`` for in ``folder``, and what the data can tell.
+
+    Raises what :func:`explorer.measured.folder.write_condition` does, with nothing changed.
+    """
+    words = ["explorer", *measured_data_words(folder, asked, brought)]
+    found = write_condition(folder, asked, brought)
+    return CommandResult(written_text(found), shlex.join(words), note=f"In the list of Diagnose: {folder.name}.")
+
+
+def measured_data_words(folder: Path, asked: NewCondition, brought: Brought) -> list[str]:
+    """The command line that makes the same of the same files, without the program's name."""
+    words = ["new", "measurement", folder.name, "--out", str(folder.parent), "--condition", asked.name]
+    for option, given in (
+        ("--study", [asked.study]),
+        ("--material", [asked.material]),
+        ("--set", asked.settings),
+        ("--uncertainty", asked.uncertainty),
+        ("--photo", brought.photographs),
+        ("--scale", [None if brought.pixel is None else f"{1e3 * brought.pixel:g}"]),
+        ("--angles", [brought.angles]),
+        ("--balance", brought.balances),
+        ("--starts", brought.starts),
+        ("--lag", [brought.lag]),
+        ("--scan", brought.scans),
+        ("--scan-unit", [brought.scan_unit] if brought.scans else []),
+        ("--drum", [brought.drum]),
+    ):
+        words += [word for one in given if one is not None for word in (option, str(one))]
+    return words
+
+
+@dataclass(frozen=True)
+class SheetOrder:
+    """What `explorer design` is asked for beside the design: its file of factors, what it should see, kind of file."""
+
+    factors: str
+    sigma: float | None = None
+    """Standard deviation of one run."""
+    effect: float | None = None
+    """Change that it should see."""
+    workbook: bool = False
+    decimal_comma: bool = False
+
+
+def sheet_result(order: DesignOrder, asked: SheetOrder) -> CommandResult:
     """`explorer design`: the runs of a design as a sheet to fill in."""
-    file = read_factors(asset_path("designs", factors))
+    check_power(asked.sigma, asked.effect)
+    file = read_factors(asset_path("designs", asked.factors))
     plan = make_plan(order, file)
-    words = ["explorer", "design", order.design, "--factors", factors, "--out", "runs.csv"]
-    numbers = (
-        ("--runs", order.runs),
-        ("--replicates", order.replicates),
-        ("--centre", order.centre),
-        ("--blocks", order.blocks),
-        ("--lattice", order.lattice),
-        ("--sigma", sigma),
-    )
-    for option, number in numbers:
-        words += [] if number is None else [option, f"{number:g}"]
-    words += ["--fold"] if order.fold else []
-    words += ["--nonregular"] if order.nonregular else []
+    name = f"runs{WORKBOOK if asked.workbook else '.csv'}"
+    words = ["explorer", "design", order.design, "--factors", asked.factors, "--out", name]
+    options: dict[str, Any] = {
+        "--runs": order.runs,
+        "--replicates": order.replicates,
+        "--centre": order.centre,
+        "--blocks": order.blocks,
+        "--fraction": order.fraction or None,
+        "--lattice": order.lattice,
+        "--alpha": None if order.alpha == Alpha.ROTATABLE else order.alpha,
+        "--model": order.model,
+        "--augment": order.augment,
+        "--seed": order.seed,
+        "--sigma": asked.sigma,
+        "--effect": asked.effect,
+    }
+    words += [word for option, value in options.items() if value is not None for word in (option, str(value))]
     words += [word for generator in order.generators for word in ("--generator", generator)]
-    words += [] if order.model is None else ["--model", order.model.value]
     words += [word for constraint in order.constraints for word in ("--constraint", constraint)]
+    flags = {
+        "--fold": order.fold,
+        "--nonregular": order.nonregular,
+        "--standard-order": order.standard_order,
+        "--decimal-comma": asked.decimal_comma,
+    }
+    words += [flag for flag, given in flags.items() if given]
     return CommandResult(
-        plan_text(plan, file, sigma, None), shlex.join(words), {}, {"runs.csv": sheet_text(plan, file).encode()}
+        plan_text(plan, file, asked.sigma, asked.effect),
+        shlex.join(words),
+        {},
+        {name: sheet_content(plan, file, asked.workbook, asked.decimal_comma)},
     )
 
 

@@ -23,8 +23,6 @@ from solver.assets import asset_path
 
 CLOSED_FORM = ("shear", "rebound")
 """Tests with a twin whose formula's bias is a closed form only."""
-BENCH = "bench"
-"""Kind of the result in a folder of --report, and the name of its file."""
 
 
 @dataclass(frozen=True)
@@ -91,17 +89,16 @@ def _template(order: LabOrder, say: Callable[[str], None]) -> None:
 def _write(order: LabOrder, result: LabResult, part: dict[str, Any]) -> None:
     """The files that were asked for."""
     about = made_today(order.author, order.notes)
-    if order.figure:
-        from explorer.report.bench import write_curves
-
-        write_curves(order.figure, result, about)
-    if order.report:
-        from explorer.report.bench import bench_report
+    if order.figure or order.report:
+        from explorer.report.bench import bench_record, bench_report, write_curves
         from explorer.report.folder import write_report
 
-        content = {"kind": BENCH, "about": about.to_dict(), "result": result.to_dict()}
-        with appearing(order.report, "--report") as folder:
-            write_report(bench_report(result, about), folder, {f"{BENCH}.json": json_text(content) + "\n"})
+        found = bench_record(result, about, files_of(order))
+        if order.figure:
+            write_curves(order.figure, found)
+        if order.report:
+            with appearing(order.report, "--report") as folder:
+                write_report(bench_report(found), folder, {found.NAME: json_text(found.to_dict()) + "\n"})
     if order.out:
         order.out.write_text(part_file(result, part), encoding="utf-8")
 
@@ -119,6 +116,12 @@ def analysed(order: LabOrder) -> LabResult:
     if order.test == "composition":
         return analyse_composition(path, order.left_out)
     return analyse(order.test, path)
+
+
+def files_of(order: LabOrder) -> list[tuple[str, Path]]:
+    """Test and file of every sheet of readings that ``order`` names."""
+    files = [(order.test, order.file), ("compression", order.compression)]
+    return [(test, asset_path("laboratory", name)) for test, name in files if name is not None]
 
 
 def _check(order: LabOrder) -> None:

@@ -1,11 +1,13 @@
 """Each picture with what was read off it drawn over it, and the simulated pile below, as one image.
 
-White: the outline. Orange: the flank lines. Blue: the base line. All have a dark rim, to be seen on any grey.
+White: the outline. Orange: the flank lines. Blue: the base line. Green, where asked for: the lines of the lower, middle
+and upper third of each flank. All have a dark rim, to be seen on any grey.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +17,7 @@ from explorer.photograph.simulated import SimulatedPiles
 from explorer.tables.photograph import angle_text
 from solver.observables.repose import flank_feet
 from solver.photograph import PhotographedPile, Picture, Refusal
+from solver.photograph.reading_error import THIRDS
 
 Array = npt.NDArray[np.float64]
 Colour = tuple[int, int, int]
@@ -26,15 +29,21 @@ TEXT = 18
 OUTLINE: Colour = (255, 255, 255)
 FLANK: Colour = (230, 159, 0)
 BASE: Colour = (86, 180, 233)
+THIRD: Colour = (0, 200, 140)
 RIM: Colour = (20, 24, 28)
 GROUND: Colour = (240, 240, 238)
+LEVEL_DEG = 1.0
+"""Slope of a third below which its line is as good as level, and not drawn."""
 
 
 def sheet(
-    pictures: Sequence[Picture], readings: Sequence[PhotographedPile | Refusal], simulated: SimulatedPiles | None
+    pictures: Sequence[Picture],
+    readings: Sequence[PhotographedPile | Refusal],
+    simulated: SimulatedPiles | None,
+    thirds: bool = False,
 ) -> Image.Image:
-    """All panels, one below the other; at most ``MOST_PANELS`` pictures."""
-    panels = [_panel(*pair) for pair in zip(pictures, readings, strict=True)][:MOST_PANELS]
+    """All panels, one below the other; at most ``MOST_PANELS`` pictures. ``thirds``: with the lines of the thirds."""
+    panels = [_panel(*pair, thirds) for pair in zip(pictures, readings, strict=True)][:MOST_PANELS]
     if simulated is not None:
         piles = [reading for reading in readings if isinstance(reading, PhotographedPile)]
         panels.append(_simulated_panel(simulated, piles[0] if piles else None))
@@ -46,7 +55,7 @@ def sheet(
     return whole
 
 
-def _panel(picture: Picture, reading: PhotographedPile | Refusal) -> Image.Image:
+def _panel(picture: Picture, reading: PhotographedPile | Refusal, thirds: bool) -> Image.Image:
     grey = Image.fromarray(np.clip(picture.grey, 0, 255).astype(np.uint8))
     size = (WIDTH, max(1, round(WIDTH * picture.height / picture.width)))
     head = 2 * TEXT + 2 * MARGIN
@@ -71,7 +80,22 @@ def _panel(picture: Picture, reading: PhotographedPile | Refusal) -> Image.Image
     _line(draw, place(reading.outline.u, reading.outline.top), OUTLINE, 1)
     for flank in reading.flanks:
         _line(draw, place(np.array(flank.u), np.array(flank.z)), FLANK, 4)
+    for u, z in _thirds(reading) if thirds else ():
+        _line(draw, place(u, z), THIRD, 2)
     return panel
+
+
+def _thirds(reading: PhotographedPile) -> Iterator[tuple[Array, Array]]:
+    """u, z of a line of each third of a flank: of its own slope, through the middle of the outline there."""
+    u, z = reading.outline.u, reading.outline.top
+    for side, angle in ((-1.0, reading.angles.left), (1.0, reading.angles.right)):
+        for (low, high), slope_deg in zip(pairwise(THIRDS), angle.thirds_deg, strict=True):
+            ends = reading.height * np.array([low, high])
+            there = (side * u > 0.0) & (z >= ends[0]) & (z <= ends[1])
+            ends = ends + np.array([0.1, -0.1]) * np.ptp(ends)  # gaps, so that three lines are seen
+            if there.sum() > 1 and abs(slope_deg) > LEVEL_DEG:
+                run = (ends - z[there].mean()) / np.tan(np.radians(slope_deg))
+                yield u[there].mean() - side * run, ends
 
 
 def _simulated_panel(simulated: SimulatedPiles, beside: PhotographedPile | None) -> Image.Image:

@@ -16,10 +16,13 @@ from explorer.photograph.annotated import sheet
 from explorer.photograph.simulated import SimulatedPiles, simulated_piles
 from solver.assets import asset_path
 from solver.photograph import (
+    Board,
     NotAPile,
     PhotographedPile,
+    PhotographError,
     Picture,
     Refusal,
+    board_of,
     open_picture,
     read_photograph,
     reference_pixels,
@@ -27,6 +30,8 @@ from solver.photograph import (
 
 FARTHEST = 1e5
 """Largest coordinate that a picture may be asked about [px]."""
+SAME_SHAPE = 0.01
+"""By which the width over the height of two pictures of one camera may differ, relatively."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +48,8 @@ class MeasureOrder:
     plot: Path | None
     outline: Path | None
     simulation: str | None
+    checkerboard: Path | None = None
+    """Picture of one, by the same camera; None: the base line tells the lens."""
 
 
 def measure_order(
@@ -54,6 +61,7 @@ def measure_order(
     plot: Path | None,
     outline: Path | None,
     simulation: str | None,
+    checkerboard: str | None = None,
 ) -> MeasureOrder:
     """The order of a command line; CommandError or AssetNotFoundError in one line."""
     _positive(scale_mm, "--scale", "mm/px")
@@ -81,6 +89,7 @@ def measure_order(
         plot=plot,
         outline=outline,
         simulation=simulation,
+        checkerboard=None if checkerboard is None else Path(checkerboard),
     )
 
 
@@ -106,6 +115,8 @@ class MeasuredPhotographs:
 
     readings: tuple[PhotographedPile | Refusal, ...]
     simulated: SimulatedPiles | None
+    board: Board | None = None
+    """The checkerboard that told the lens."""
 
     @property
     def piles(self) -> tuple[PhotographedPile, ...]:
@@ -121,12 +132,14 @@ class MeasuredPhotographs:
 def run_measure(order: MeasureOrder) -> MeasuredPhotographs:
     """Every picture is opened before the first is measured, so that a bad file ends the command at once.
 
-    Raises PhotographError for a file that is no picture, and whatever the simulated source raises.
+    Raises PhotographError for a file that is no picture, or no checkerboard, and whatever the simulated source raises.
     """
     pictures = [open_picture(path) for path in order.pictures]
+    board = None if order.checkerboard is None else _board(order.checkerboard, pictures)
     measured = MeasuredPhotographs(
-        tuple(_reading(picture, order) for picture in pictures),
+        tuple(_reading(picture, order, board) for picture in pictures),
         None if order.simulation is None else simulated_piles(order.simulation),
+        board,
     )
     if order.plot is not None:
         file = io.BytesIO()
@@ -137,12 +150,24 @@ def run_measure(order: MeasureOrder) -> MeasuredPhotographs:
     return measured
 
 
-def _reading(picture: Picture, order: MeasureOrder) -> PhotographedPile | Refusal:
+def _board(path: Path, pictures: list[Picture]) -> Board:
+    """The checkerboard in ``path``; PhotographError where ``pictures`` are of another shape than that one."""
+    board = board_of(open_picture(path))
+    for picture in pictures:
+        if abs(picture.width / picture.height / board.shape - 1.0) > SAME_SHAPE:
+            raise PhotographError(
+                f"--checkerboard {path}: {board.shape:.2f} times as wide as high, {picture.name} "
+                f"{picture.width / picture.height:.2f} times; allowed: whole pictures of one camera, held alike"
+            )
+    return board
+
+
+def _reading(picture: Picture, order: MeasureOrder, board: Board | None) -> PhotographedPile | Refusal:
     try:
         scale = _metres_per_pixel(picture, order)
     except NotAPile as reason:
         return Refusal(picture.name, reason.reason, reason.detail)
-    return read_photograph(picture, scale, order.base_line)
+    return read_photograph(picture, scale, order.base_line, None if board is None else board.bend)
 
 
 def _metres_per_pixel(picture: Picture, order: MeasureOrder) -> float | None:

@@ -25,6 +25,7 @@ from PIL import Image
 from scipy import ndimage
 
 from doe.record import RecordError
+from doe.studies.study import load_study
 from doe.target import Target
 from explorer.background.output_folder import ResultFile
 from explorer.errors import CommandError
@@ -34,6 +35,7 @@ from explorer.files.uploads import label
 from explorer.photograph.run import MeasuredPhotographs
 from explorer.report.figures.pours import Backdrop
 from explorer.report.photograph import PhotographResult, ReadPile, photograph_result
+from explorer.study.edit import remeasured
 from explorer.tables.photograph import angle_words
 from explorer.units import enumeration, fixed
 from solver.photograph import PhotographedPile, Picture, open_picture
@@ -47,6 +49,8 @@ OF_ONE = "of reading one photograph"
 UPRIGHT = ".upright.jpg"
 WIDEST, QUALITY = 900, 80
 """Of an upright picture: columns [px], and quality of its JPEG."""
+PLACES = 4
+"""Decimal places of an angle [°] in a study's file."""
 MARGIN = 0.08
 """Of an upright picture around its pile, as a share of the pile's width."""
 DIGEST = re.compile(r"-[0-9a-f]{12}$")
@@ -99,6 +103,17 @@ class PhotographedTarget:
             f"{fixed(self.mean)}° (standard deviation between piles {fixed(self.sd)}°; standard error of the mean "
             f"{fixed(self.sd / self.n**0.5)}°), n = {self.n}, read off {enumeration(self.names)}."
         )
+
+    @property
+    def provenance(self) -> str:
+        """The photographs, their date of reading, and what the standard deviation is of, for a comment in a file."""
+        names = ", ".join("".join(filter(str.isprintable, name)) for name in self.names)
+        of = (
+            "sd is the standard error of reading it; how piles differ is not in it, so that there is no n"
+            if self.n == 1
+            else f"sd is that between the {self.n} photographs (over n - 1), each taken for another pile"
+        )
+        return f"photographs: {names}, read {self.result.about.date}; {of}"
 
     def of_study(self, targets: Sequence[Target]) -> tuple[Target, ...]:
         """``targets`` of a study with its angle of repose as photographed; weight and margin stay.
@@ -218,6 +233,26 @@ def keep_target(
     if old is not None:
         _remove_pictures(folder, {pile.name for pile in old.result.piles} - set(pictures))
     return PhotographedTarget(folder, replace(result, piles=tuple(kept)))
+
+
+def write_into_study(file: Path, pictures: Sequence[Path], measured: MeasuredPhotographs) -> str:
+    """Put what was read off ``pictures`` into the angle of repose of the study ``file``; the line that says so.
+
+    Raises CommandError, with the file as it was, where one of them shows no pile or stands twice, and as
+    :func:`explorer.study.edit.remeasured`; the study's own errors for one that cannot be read.
+    """
+    for refusal in measured.refusals:
+        raise CommandError(f"{refusal.name}: no angle: {refusal.reason}: {refusal.detail}")
+    seen: dict[bytes, Path] = {}
+    for picture in pictures:
+        if (twin := seen.setdefault(picture.read_bytes(), picture)) is not picture:
+            raise CommandError(f"{picture}: is the same picture as {twin}; take one of another pile")
+    target = PhotographedTarget(file.parent, photograph_result(measured, "", ""))
+    (angle,) = (one for one in target.of_study(load_study(str(file)).targets) if one.observable == OBSERVABLE)
+    assert angle.sd is not None
+    rounded = replace(angle, mean=round(angle.mean, PLACES), sd=round(angle.sd, PLACES))
+    write_whole(file.resolve(), remeasured(file, rounded, target.provenance))
+    return f"{file}: {target.line}"
 
 
 def remove_target(folder: Path) -> None:

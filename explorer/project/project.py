@@ -17,10 +17,10 @@ from pathlib import Path
 from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
 from explorer.photograph.target import FOLDER
-from explorer.scene.file import load_scene, study_path
+from explorer.scene.file import study_path
 from explorer.scene.presets import data_folder
 from explorer.scene.source import SceneSource, material_source, study_source
-from explorer.scene.starter_files import STUDY_ENDING, study_text, write_study
+from explorer.scene.starter_files import STUDY_ENDING, study_scene, study_text, write_study
 from solver import ParameterError
 from solver.toml_file import TomlTable, checked, read_toml
 
@@ -156,7 +156,7 @@ def material_project(material: str) -> Project:
         study = data_folder() / "starter_studies" / f"{own.stem}{STUDY_ENDING}.toml"
         study.parent.mkdir(parents=True, exist_ok=True)
         named = str(own.absolute()) if own.is_file() else source.material
-        write_whole(study, study_text(study, named, load_scene("funnel", named)))
+        write_whole(study, study_text(study, named, study_scene(named)))
     return Project(_words(own.stem), study, source, data_folder())
 
 

@@ -11,7 +11,7 @@ from explorer.background.command_process import CommandStatus
 from explorer.live.messages import SessionState, Status
 from explorer.outcomes import OUTCOME_WORDS
 from explorer.photograph.target import PhotographedTarget
-from explorer.units import observed
+from explorer.units import observable_label, observed
 from solver.pours.record import Outcome
 from solver.scenes.scene import Scene
 
@@ -93,6 +93,8 @@ def measured_step(targets: Sequence[Target], photographed: PhotographedTarget | 
     spread = "" if target.sd is None else f" ± {observed(target.observable, target.sd)}"
     measured = target.sd is not None and target.sd_source == "measured"
     state = StepState.MEASURED if measured else StepState.ASSUMED
+    hint += f" Mean ± SD of {observable_label(target.observable)}." if spread else ""
+    hint += "".join(f" Also {observable_label(other.observable)}." for other in targets[1:])
     return Step("Measured", state, f"{observed(target.observable, target.mean)}{spread}", hint, Room.LABORATORY)
 
 

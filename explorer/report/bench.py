@@ -1,75 +1,125 @@
-"""The report of a bench test, and charts of it: a laboratory's curves, and what the solver's instrument read.
-
-Of the laboratory every replicate, with the part that was taken as straight; of the solver every column against the
-first.
-"""
+"""The report of a bench test: what was measured and how well, the curves and replicates behind it, and the readings."""
 
 from __future__ import annotations
 
+import hashlib
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import ClassVar
 
-from doe.laboratory import CurveFit, Derived, LabResult
-from doe.laboratory.linear_range import LinearRange
+from doe.laboratory import Derived, Estimate, LabResult, read_table
+from doe.laboratory.analysis import TESTS
+from doe.laboratory.elastic import SPECIMEN
 from doe.laboratory.result import CONDITIONS
+from doe.laboratory.tables import Column, Reading, by_replicate
 from doe.provenance import About
+from doe.record import Record
 from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
+from explorer.files.run_result import versions
 from explorer.laboratory.twin_row import LIKE
 from explorer.report.content import (
     Banner,
     Block,
     Bullets,
     DataTable,
+    Facts,
     Figure,
     Report,
     Section,
-    Spec,
     Strong,
     Table,
     Word,
 )
-from explorer.report.figures.style import CHOSEN, FACTOR, Json, axis, chart, label
+from explorer.report.figures.bench import (
+    bench_unit,
+    curve_charts,
+    curve_title,
+    interval,
+    is_straight,
+    replicates,
+    side_by_side_quantities,
+    sieve_charts,
+    specimen,
+)
 from explorer.report.html import page
-from explorer.units import enumeration, number, reading_unit
+from explorer.report.methods import bench_methods
+from explorer.units import MISSING, enumeration, fixed, number
 
-PANEL_HEIGHT = 420
 PARAMETERS = (
     "Lay the parameters over a material: `explorer lab … --out part.toml`, then `explorer new material NAME --part "
     "part.toml`."
 )
 TARGET = "A target, no parameter: parameters are found by it. Its like is simulated by {}."
-LEAST_POINTS = 3
-"""Fewer readings of the solver's instrument are a few numbers, which the table has, and no curve."""
+DECISIVE = {"dimensions": "geometric_mean_diameter", "sieve": "d50", "drum": "dynamic_angle"}
+"""Test → the quantity of its verdict, where that is not the first one."""
+MOST_NAMED = 3
+"""Results that a verdict names."""
+MOST_ROWS = 40
+"""Readings that the page shows; the data have all."""
 
 
-def write_curves(path: Path, result: LabResult, about: About) -> None:
+@dataclass(frozen=True)
+class Readings(Record):
+    """One file of readings as its test took them [SI]."""
+
+    test: str
+    file: str
+    sha256: str
+    rows: tuple[Reading, ...]
+
+
+@dataclass(frozen=True)
+class BenchResult(Record):
+    """The content of ``bench.json``: what a test gave, and the readings that it was taken from."""
+
+    NAME: ClassVar[str] = "bench.json"
+
+    result: LabResult
+    about: About
+    readings: tuple[Readings, ...] = ()
+    versions: dict[str, str | None] = field(default_factory=dict)
+    kind: str = "bench"
+
+
+def bench_record(result: LabResult, about: About, files: Sequence[tuple[str, Path]]) -> BenchResult:
+    """The record of ``result``; ``files``: test and file of the readings."""
+    return BenchResult(result, about, tuple(_readings(test, path) for test, path in files), versions())
+
+
+def _readings(test: str, path: Path) -> Readings:
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    return Readings(test, path.name, digest, read_table(path, TESTS[test].layout).rows)
+
+
+def write_curves(path: Path, found: BenchResult) -> None:
     """Write the report of a test with curves as one page; CommandError without curves."""
-    if not result.curves:
+    if not found.result.curves:
         raise CommandError("--plot: single readings only, no curve to draw")
-    write_whole(path, page(bench_report(result, about)))
+    write_whole(path, page(bench_report(found)))
 
 
-def bench_report(result: LabResult, about: About) -> Report:
+def bench_report(found: BenchResult) -> Report:
     """The report of a bench test: what was measured, by which formula, and the curves behind it."""
-    sections = [_parameters(result)]
-    figures = []
-    for k, (title, spec) in enumerate(curve_charts(result).items(), start=1):
-        curves = [one for one in result.curves if _group(one) == title]
-        points = sum(len(one.force) for one in curves)
-        words = title.replace("_", " ")
-        part = "the part taken as straight" if _straight(curves[0]) else "Hertz’s law, up to yield"
-        caption = f"{words}: n = {len(curves)} replicates, {points} points. Line: {part}."
-        figures.append(Figure(f"curves-{k}", spec, caption))
-    if figures:
-        sections.append(Section("Curves", tuple(figures)))
+    result = found.result
+    methods, references = bench_methods(result, found.versions)
+    sections = [
+        _parameters(result),
+        Section("Curves", tuple(_curves(found))),
+        Section("Replicates", tuple(_replicates(result))),
+        Section("Readings", tuple(block for one in found.readings for block in _inputs(one))),
+        methods,
+    ]
     return Report(
         f"{result.test.replace('_', ' ').capitalize()}: {Path(result.file).name}",
-        "Readings of a bench test and the parameters that follow",
+        "Readings of a bench test and what follows from them",
         banner(result),
-        tuple(sections),
-        about,
-        (_data(result),),
+        tuple(section for section in sections if section.blocks),
+        found.about,
+        (_data(result), *map(_readings_data, found.readings)),
+        references,
     )
 
 
@@ -77,23 +127,51 @@ def banner(result: LabResult) -> Banner:
     """What was measured; a single replicate has no interval and measures nothing."""
     found = [one for one in result.derived if one.name not in CONDITIONS]
     alone = [one for one in found if one.summary.n < 2]
-    kinds = enumeration([f"{one.name.replace('_', ' ')} {_of(one)}".strip() for one in found])
     outliers = sum(len(one.summary.outliers) for one in found)
     if not found or len(alone) == len(found):
+        kinds = enumeration([f"{one.name.replace('_', ' ')} {specimen(one)}".strip() for one in found])
         return Banner(
             Word.NO_ANSWER,
             "",
             f"One replicate of {kinds}: a value without a spread and without an interval.",
             "Repeat the test: five replicates give a useful interval.",
         )
-    least = min(one.summary.n for one in found)
-    odd = f"; {outliers} readings are outliers at the 5 % level and were kept" if outliers else ""
+    sizes = sorted({one.summary.n for one in found})
+    n = f"{sizes[0]} replicates" if len(sizes) == 1 else f"{sizes[0]} replicates at least"
+    kept = f"{outliers} readings are outliers" if outliers > 1 else "one reading is an outlier"
+    odd = f"; {kept} at the 5 % level and kept" if outliers else ""
+    errors = ", with the errors of the readings" if any(one.reading for one in found) else ""
     return Banner(
         Word.MEASURED,
-        kinds,
-        f"{least} replicates at least of every quantity{odd}.",
+        _results(result, found),
+        f"{n} of every quantity; ±: 95 % of the mean, Student’s t{errors}{odd}.",
         TARGET.format(LIKE[result.test]) if result.test in LIKE else PARAMETERS,
     )
+
+
+def _results(result: LabResult, found: list[Derived]) -> str:
+    """The results that decide, each with its interval; a name that several share is said once."""
+    names = {one.name for one in found}
+    wanted = DECISIVE.get(result.test, found[0].name)
+    of: list[Derived | Estimate] = [one for one in found if one.name == (wanted if wanted in names else found[0].name)]
+    of += [one for one in result.estimates if one.name == "poisson_ratio"]
+    told, said = [], ""
+    for one in of[:MOST_NAMED]:
+        told.append(f"{'' if one.name == said else one.name.replace('_', ' ')} {specimen(one)} {_value(one)}".strip())
+        said = one.name
+    more = len(of) - MOST_NAMED
+    return enumeration([*told, *([f"{more} more"] if more > 0 else [])])
+
+
+def _value(one: Derived | Estimate) -> str:
+    """Mean ± half its interval, to the second digit of the ±."""
+    unit = bench_unit(one.unit)
+    mean, half = interval(one) if isinstance(one, Derived) else (one.value, 0.5 * (one.high - one.low))
+    mean, half = unit.of(mean), unit.of(half)
+    if not 0.0 < half < math.inf:
+        return unit.attach(number(mean, 4))
+    decimals = max(0, 1 - math.floor(math.log10(half)))
+    return unit.attach(f"{fixed(mean, decimals)} ± {fixed(half, decimals)}")
 
 
 def _parameters(result: LabResult) -> Section:
@@ -101,12 +179,12 @@ def _parameters(result: LabResult) -> Section:
     for one in result.derived:
         if one.name in CONDITIONS:
             continue
-        unit, s = reading_unit(one.unit), one.summary
+        unit, s = bench_unit(one.unit), one.summary
         mean, sd, low, high = (number(unit.of(value), 4) for value in (s.mean, s.sd, s.low, s.high))
         odd = enumeration([one.replicates[k] for k in s.outliers])
         rows.append(
             (
-                _of(one),
+                specimen(one),
                 one.name.replace("_", " "),
                 Strong(unit.attach(mean)),
                 sd,
@@ -124,11 +202,16 @@ def _parameters(result: LabResult) -> Section:
         blocks.append(Table(head, tuple(errors), "With the errors that the readings declare, by the GUM."))
     estimates = []
     for other in result.estimates:
-        unit = reading_unit(other.unit)
+        unit = bench_unit(other.unit)
         value, low, high = (number(unit.of(x), 4) for x in (other.value, other.low, other.high))
-        of = "–".join(other.of)
         estimates.append(
-            (of, other.name.replace("_", " "), Strong(unit.attach(value)), f"{low} … {high}", other.formula)
+            (
+                specimen(other),
+                other.name.replace("_", " "),
+                Strong(unit.attach(value)),
+                f"{low} … {high}",
+                other.formula,
+            )
         )
     if estimates:
         blocks.append(Table(("of", "quantity", "value", "95 %", "formula"), tuple(estimates), "From several tests."))
@@ -139,14 +222,90 @@ def _parameters(result: LabResult) -> Section:
 def _with_errors(one: Derived) -> tuple[str, ...]:
     """What the errors that the readings declare add to a mean."""
     assert one.reading is not None
-    unit, u = reading_unit(one.unit), one.reading
+    unit, u = bench_unit(one.unit), one.reading
     found = [number(unit.of(x), 2) for x in (one.summary.standard_error, u.standard, u.combined)]
     low, high = (number(unit.of(x), 4) for x in (u.low, u.high))
-    return (_of(one), one.name.replace("_", " "), *found, unit.attach(f"{low} … {high}"))
+    return (specimen(one), one.name.replace("_", " "), *found, unit.attach(f"{low} … {high}"))
 
 
-def _of(one: Derived) -> str:
-    return "–".join(one.of).replace("_", " ")
+def _curves(found: BenchResult) -> Iterator[Figure]:
+    """Force over displacement, or the cumulative curve of a sieving, with what was fitted to it."""
+    for k, (title, spec) in enumerate(curve_charts(found.result).items(), start=1):
+        curves = [one for one in found.result.curves if curve_title(one) == title]
+        points = sum(len(one.force) for one in curves)
+        part = "the part taken as straight" if is_straight(curves[0]) else "Hertz’s law, up to yield"
+        caption = f"{title.replace('_', ' ')}: n = {len(curves)} replicates, {points} points. Line: {part}."
+        yield Figure(f"curves-{k}", spec, caption)
+    for one in found.readings if found.result.test == "sieve" else ():
+        for k, (name, spec) in enumerate(sieve_charts(one.rows).items(), start=1):
+            n = len(by_replicate(row for row in one.rows if row.of[0] == name))
+            caption = (
+                f"{name.replace('_', ' ')}: n = {n} samples, the undersize at every sieve. Dashed: 1 − exp(−(x/x’)ⁿ)"
+            )
+            yield Figure(f"undersize-{k}", spec, f"{caption}, least squares.")
+
+
+def _replicates(result: LabResult) -> Iterator[Figure]:
+    for k, found in enumerate(side_by_side_quantities(result), start=1):
+        own = [one for of in found.values() for one in of]
+        sizes = sorted({one.summary.n for one in own})
+        n = " … ".join(map(str, dict.fromkeys((sizes[0], sizes[-1]))))
+        errors = ", with the errors of the readings" if any(one.reading for one in own) else ""
+        tests = enumeration(sorted({one.summary.outlier_test for one in own}))
+        caption = f"n = {n} replicates of each. Bar: 95 % of the mean by Student’s t{errors}. Outliers by {tests}, 5 %."
+        yield Figure(f"replicates-{k}", replicates(found), caption)
+
+
+def _inputs(found: Readings) -> Iterator[Block]:
+    """The file, and a row for each reading, or for each replicate of a curve, with the ± that it declares."""
+    yield Facts((("File", found.file), ("SHA-256", found.sha256)))
+    layout = TESTS[found.test].layout
+    present = {stem for row in found.rows for stem in row.values}
+    columns = [one for one in layout.columns if one.stem in present]
+    rows, header = found.rows, [" – ".join(layout.keys), "replicate"]
+    counts: dict[tuple[tuple[str, ...], str], int] = {}
+    for row in rows:
+        counts[row.of, row.replicate] = counts.get((row.of, row.replicate), 0) + 1
+    curves = found.test != "sieve" and any(count > 1 for count in counts.values())
+    if curves:
+        columns = [one for one in columns if one.stem in SPECIMEN]
+        rows = tuple({(row.of, row.replicate): row for row in rows}.values())
+    cells = [
+        (
+            "–".join(row.of).replace("_", " "),
+            row.replicate,
+            *(_cell(one, row) for one in columns),
+            *([str(counts[row.of, row.replicate])] if curves else []),
+        )
+        for row in rows[:MOST_ROWS]
+    ]
+    header += [f"{one.stem.replace('_', ' ')}{_bracketed(one)}" for one in columns]
+    caption = "±: as declared beside the reading." if any("±" in cell for row in cells for cell in row) else ""
+    if not caption:
+        caption = "No errors of the readings were declared." if layout.errors else ""
+    if len(rows) > MOST_ROWS:
+        caption += f" The first {MOST_ROWS} of {len(rows)}; all are in the data."
+    yield Table((*header, *(["points"] if curves else [])), tuple(cells), caption.strip())
+
+
+def _cell(column: Column, row: Reading) -> str:
+    if column.stem not in row.values:
+        return MISSING
+    text = number(_in_sheet_unit(column, row.values[column.stem]), 6)
+    error = row.values.get(column.error.stem)
+    return text if error is None else f"{text} ± {number(_in_sheet_unit(column, error))}"
+
+
+def _in_sheet_unit(column: Column, value: float) -> float:
+    """SI → the unit of the test's template, without the dust of the conversion."""
+    return float(f"{value / column.factor(column.sheet_name):.12g}")
+
+
+def _bracketed(column: Column) -> str:
+    unit = column.sheet_name.removeprefix(column.stem).removeprefix("_").replace("_", "/")
+    for plain, symbol in (("deg", "°"), ("2", "²"), ("3", "³")):
+        unit = unit.replace(plain, symbol)
+    return f" [{unit}]" if unit else ""
 
 
 def _data(result: LabResult) -> DataTable:
@@ -159,81 +318,18 @@ def _data(result: LabResult) -> DataTable:
     return DataTable("replicates", ("of", "quantity", "replicate", "value", "unit", "parameter"), rows)
 
 
-def curve_charts(result: LabResult) -> dict[str, Spec]:
-    """Title → chart per component and quantity; none where the readings are no curves."""
-    groups: dict[str, list[CurveFit]] = {}
-    for curve in result.curves:
-        groups.setdefault(_group(curve), []).append(curve)
-    return {title: force_displacement(curves, title) for title, curves in groups.items()}
-
-
-def _group(curve: CurveFit) -> str:
-    return f"{'-'.join(curve.of)}, {curve.quantity}"
-
-
-def force_displacement(curves: list[CurveFit], title: str) -> Spec:
-    """Points of every replicate and, over them, the part that counts, straight or Hertzian, drawn on to zero force."""
-    traces: list[Json] = []
-    for curve in curves:
-        first = curve is curves[0]
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "markers",
-                "x": [1e3 * x for x in curve.displacement],
-                "y": list(curve.force),
-                "name": "points",
-                "legendgroup": "points",
-                "showlegend": first,
-                "marker": {"size": 4, "color": FACTOR, "opacity": 0.5},
-                "hovertemplate": f"replicate {label(curve.replicate)}: %{{x:.4g}} mm, %{{y:.4g}} N<extra></extra>",
-            }
+def _readings_data(found: Readings) -> DataTable:
+    """Every reading in the units of its test's template, as `explorer lab` reads it."""
+    layout = TESTS[found.test].layout
+    present = {stem for row in found.rows for stem in row.values}
+    pairs = [(one, stem) for one in layout.columns for stem in (one.stem, one.error.stem) if stem in present]
+    names = [one.sheet_name.replace(one.stem, stem, 1) for one, stem in pairs]
+    rows = tuple(
+        (
+            *row.of,
+            row.replicate,
+            *(_in_sheet_unit(one, row.values[stem]) if stem in row.values else None for one, stem in pairs),
         )
-        x, force = curve.fit.drawn
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "x": [1e3 * at for at in x],
-                "y": list(force),
-                "name": f"{'straight' if _straight(curve) else 'Hertzian'} part, on to zero force",
-                "legendgroup": "straight",
-                "showlegend": first,
-                "line": {"color": CHOSEN, "width": 2},
-                "hovertemplate": f"replicate {label(curve.replicate)}: {1e-6 * curve.modulus:.4g} MPa<extra></extra>",
-            }
-        )
-    layout: Json = {
-        "title": {"text": label(title.replace("_", " "))},
-        "xaxis": axis("displacement [mm]"),
-        "yaxis": axis("force [N]"),
-        "margin": {"l": 60, "r": 24, "t": 80, "b": 52},
-    }
-    return chart(traces, layout, PANEL_HEIGHT)
-
-
-def _straight(curve: CurveFit) -> bool:
-    return isinstance(curve.fit, LinearRange)
-
-
-def bench_charts(data: dict[str, Any]) -> dict[str, Spec]:
-    """Title → chart, from what `explorer.tables.pours.bench_data` gives."""
-    columns = list(data["series"].items())
-    if not columns or len(columns[0][1]) < LEAST_POINTS:
-        return {}
-    (name, across), *others = columns
-    return {f"{other} over {name}": _curve(name, across, other, values) for other, values in others}
-
-
-def _curve(name: str, across: list[float | None], other: str, values: list[float | None]) -> Spec:
-    trace = {
-        "type": "scatter",
-        "mode": "lines+markers",
-        "x": across,
-        "y": values,
-        "name": label(other),
-        "line": {"color": FACTOR, "width": 2},
-        "marker": {"size": 4},
-        "showlegend": False,
-    }
-    return chart([trace], {"xaxis": axis(name), "yaxis": axis(other)})
+        for row in found.rows
+    )
+    return DataTable(f"readings_{found.test}", (*layout.keys, "replicate", *names), rows)

@@ -31,11 +31,13 @@ class Word(StrEnum):
     MEASURED = "MEASURED"
     REPRODUCED = "REPRODUCED"
     DIFFERS = "DIFFERS"
+    REFUSED = "REFUSED"
+    PLANNED = "PLANNED"
 
     @property
     def tone(self) -> str:
         """ "good", "bad" or "open": the colour of the banner, which never says more than the word."""
-        if self in (Word.NOT_CALIBRATED, Word.OUT_OF_REACH, Word.UNEXPLAINED, Word.DIFFERS):
+        if self in (Word.NOT_CALIBRATED, Word.OUT_OF_REACH, Word.UNEXPLAINED, Word.DIFFERS, Word.REFUSED):
             return "bad"
         return "open" if self in (Word.NO_ANSWER, Word.NO_EFFECT) else "good"
 

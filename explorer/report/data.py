@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from doe.analysis.named_factors import NamedFit
+from doe.analysis.random_groups import RandomFit
 from doe.analysis.surface_anova import SurfaceAnova
 from doe.studies.study_result import StudyResult
 from explorer.report.content import DataTable
@@ -29,7 +31,15 @@ def study_data(result: StudyResult) -> tuple[DataTable, ...]:
 
 def design_data(result: DesignResult) -> tuple[DataTable, ...]:
     """Runs with their levels, and the analysis of variance, in the units of the sheet."""
-    model, fitted = result.analysis.model, result.fitted
+    model, fitted, named, random = result.analysis.model, result.fitted, result.analysis.named, result.analysis.random
+    linear = random if named is None else named
+    if linear is not None:
+        fit = zip(result.labels, linear.row_of_run, linear.observed.tolist(), linear.predicted.tolist(), strict=True)
+        header = ("run", *(one.factor for one in result.factors), result.response.name, "model")
+        runs = DataTable(
+            "runs", header, tuple((label, *result.levels_of(row), y, fitted) for label, row, y, fitted in fit)
+        )
+        return runs, _anova([(result.response.name, linear)]) if isinstance(linear, NamedFit) else _random_tests(linear)
     if model is None or fitted is None:
         return ()
     header = ("run", *(f"{one.factor} [{one.unit or '1'}]" for one in result.factors))
@@ -45,6 +55,11 @@ def design_data(result: DesignResult) -> tuple[DataTable, ...]:
     )
     runs = DataTable("runs", (*header, f"{result.response.name} [{result.response.unit or '1'}]", "model"), rows)
     return runs, _anova([(result.response.name, model.anova)])
+
+
+def _random_tests(fit: RandomFit) -> DataTable:
+    rows = tuple((one.source, one.df, one.df_error, one.f, one.p) for one in fit.tests)
+    return DataTable("tests", ("source", "df", "df_error", "f", "p"), rows)
 
 
 def diagnosis_data(result: DiagnosisResult) -> tuple[DataTable, ...]:
@@ -115,7 +130,7 @@ def _parameters(result: StudyResult) -> DataTable:
     return DataTable("parameters", header, tuple(rows))
 
 
-def _anova(models: Iterable[tuple[str, SurfaceAnova]]) -> DataTable:
+def _anova(models: Iterable[tuple[str, SurfaceAnova | NamedFit]]) -> DataTable:
     header = ("response", "source", "sum_of_squares", "df", "mean_square", "f", "p")
     return DataTable(
         "anova", header, tuple((name, *vars(row).values()) for name, model in models for row in model.rows)

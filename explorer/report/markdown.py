@@ -35,8 +35,8 @@ def document(report: Report) -> str:
     parts += [f"Notes: {escaped(about.notes)}"] if about.notes else []
     parts = [part for part in parts if part]
     for section in report.sections:
-        parts.append(f"## {escaped(section.title)}")
-        parts += [text for block in section.blocks if (text := _block(block))]
+        told = [text for block in section.blocks if (text := _block(block))]
+        parts += [f"## {escaped(section.title)}", *told] if told else []
     return "\n\n".join(parts) + "\n"
 
 

@@ -1,18 +1,24 @@
 """Methods for a paper: a paragraph written from the run's own data, and the sources that it cites.
 
-Every number in it is one of the result. A source has a DOI here only where the code that rests on it states one.
+Every number in it is one of the result; a source is cited where the text names it (`explorer.report.sources`).
 """
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from doe.designs import DESIGNS as FAMILIES
+from doe.laboratory import LabResult
+from doe.laboratory.analysis import TESTS
+from doe.laboratory.hertz import HertzRange
+from doe.laboratory.linear_range import STRAIGHTNESS, LinearRange
+from doe.laboratory.result import CONDITIONS
 from doe.provenance import SetUp
 from doe.studies.study_result import StudyResult
-from explorer.report.content import Bullets, Reference, Section, Text
+from explorer.report.content import Reference, Section
+from explorer.report.sources import SOURCES, citations, methods_section, software
 from explorer.units import (
     enumeration,
     fixed,
@@ -22,67 +28,19 @@ from explorer.units import (
     parameter_label,
     parameter_range,
     parameter_value,
+    percent,
 )
 from solver.laws import CONTACT_LAWS, HertzMindlin, LinearSpringDashpot
 
 if TYPE_CHECKING:
+    from doe.audit import Audit
+    from explorer.design.result import DesignResult
     from explorer.diagnosis.result import DiagnosisResult
+    from explorer.report.design.plan import PlanResult
+    from explorer.report.photograph import PhotographResult
 
-
-def _article(
-    key: str, author: str, title: str, journal: str, volume: int, pages: str, year: int, doi: str = ""
-) -> Reference:
-    fields = {"author": author, "title": title, "journal": journal, "volume": str(volume), "pages": pages}
-    return Reference(key, "article", fields | {"year": str(year)} | ({"doi": doi} if doi else {}))
-
-
-SOURCES = {
-    one.key: one
-    for one in (
-        _article("hertz1882", "Hertz, H.", "Über die Berührung fester elastischer Körper",
-                 "Journal für die reine und angewandte Mathematik", 92, "156", 1882),
-        _article("mindlin1953", "Mindlin, R. D. and Deresiewicz, H.",
-                 "Elastic spheres in contact under varying oblique forces", "Journal of Applied Mechanics",
-                 20, "327", 1953),
-        _article("cundall1979", "Cundall, P. A. and Strack, O. D. L.",
-                 "A discrete numerical model for granular assemblies", "Géotechnique", 29, "47", 1979,
-                 "10.1680/geot.1979.29.1.47"),
-        _article("schwager2007", "Schwager, T. and Pöschel, T.",
-                 "Coefficient of restitution and linear–dashpot model revisited", "Granular Matter", 9, "465", 2007,
-                 "10.1007/s10035-007-0065-z"),
-        _article("thornton2013", "Thornton, C. and Cummins, S. J. and Cleary, P. W.",
-                 "An investigation of the comparative behaviour of alternative contact force models during inelastic "
-                 "collisions", "Powder Technology", 233, "30", 2013),
-        _article("plackett1946", "Plackett, R. L. and Burman, J. P.",
-                 "The design of optimum multifactorial experiments", "Biometrika", 33, "305", 1946),
-        _article("box1951", "Box, G. E. P. and Wilson, K. B.", "On the experimental attainment of optimum conditions",
-                 "Journal of the Royal Statistical Society B", 13, "1", 1951),
-        _article("box1960", "Box, G. E. P. and Behnken, D. W.",
-                 "Some new three level designs for the study of quantitative variables", "Technometrics", 2,
-                 "455", 1960),
-        _article("jones2011", "Jones, B. and Nachtsheim, C. J.",
-                 "A class of three-level designs for definitive screening in the presence of second-order effects",
-                 "Journal of Quality Technology", 43, "1", 2011, "10.1080/00224065.2011.11917841"),
-        _article("holm1979", "Holm, S.", "A simple sequentially rejective multiple test procedure",
-                 "Scandinavian Journal of Statistics", 6, "65", 1979),
-        _article("welch1947", "Welch, B. L.",
-                 "The generalization of Student's problem when several different population variances are involved",
-                 "Biometrika", 34, "28", 1947),
-        _article("schuirmann1987", "Schuirmann, D. J.",
-                 "A comparison of the two one-sided tests procedure and the power approach for assessing the "
-                 "equivalence "
-                 "of average bioavailability", "Journal of Pharmacokinetics and Biopharmaceutics", 15, "657", 1987),
-        _article("efron1973", "Efron, B. and Morris, C.",
-                 "Stein's estimation rule and its competitors – an empirical Bayes approach",
-                 "Journal of the American Statistical Association", 68, "117", 1973, "10.1080/01621459.1973.10481350"),
-        _article("schaefer2005", "Schäfer, J. and Strimmer, K.",
-                 "A shrinkage approach to large-scale covariance matrix estimation and implications for functional "
-                 "genomics", "Statistical Applications in Genetics and Molecular Biology", 4, "32", 2005,
-                 "10.2202/1544-6115.1175"),
-        _article("box1967", "Box, G. E. P. and Hill, W. J.", "Discrimination among mechanistic models", "Technometrics",
-                 9, "57", 1967, "10.1080/00401706.1967.10490441"),
-    )
-}  # fmt: skip
+Methods = tuple[Section, tuple[Reference, ...]]
+"""The section, and its sources as entries."""
 LAWS = {
     HertzMindlin.name: ("hertz1882", "mindlin1953", "thornton2013"),
     LinearSpringDashpot.name: ("cundall1979", "schwager2007"),
@@ -92,65 +50,154 @@ DESIGNS = {
     "Box–Behnken": ("box1960",),
     "central composite": ("box1951",),
     "definitive screening": ("jones2011",),
+    "two-level factorial": ("box1961",),
+    "D-optimal": ("meyer1995",),
+    "I-optimal": ("meyer1995",),
+    "mixture": ("scheffe1958",),
+    "Latin hypercube": ("mckay1979",),
 }
+WITHOUT_SOLVER = ("taichi",)
+"""Programs of a result that nothing was simulated for."""
 
 
-def cited(key: str) -> str:
-    """A source in the text: "Welch 1947", "Box and Behnken 1960", "Thornton et al. 2013"."""
-    fields = SOURCES[key].fields
-    names = [name.partition(",")[0] for name in fields["author"].split(" and ")]
-    who = " and ".join(names) if len(names) < 3 else f"{names[0]} et al."
-    return f"{who} {fields['year']}"
-
-
-def citations(keys: tuple[str, ...]) -> str:
-    """Several in brackets with a blank before them; "" of none."""
-    return f" ({'; '.join(map(cited, keys))})" if keys else ""
-
-
-def study_methods(result: StudyResult) -> tuple[Section, tuple[Reference, ...]]:
+def study_methods(result: StudyResult) -> Methods:
     """The paragraph of a calibration, its sources as a list and as entries."""
     text = " ".join(filter(None, (_model(result), _rig(result), _designs(result), _tests(result))))
-    return _section(text, result.versions)
+    return methods_section(text, result.versions)
 
 
 def diagnosis_references(result: DiagnosisResult) -> tuple[Reference, ...]:
     """What the methods of a diagnosis rest on."""
     keys = ("efron1973", "schaefer2005", *(("box1967",) if result.next_experiment else ()))
-    return (*(SOURCES[key] for key in keys), *_software(result.versions))
+    return (*(SOURCES[key] for key in keys), *software(result.versions))
 
 
-def _section(text: str, versions: Mapping[str, str | None]) -> tuple[Section, tuple[Reference, ...]]:
-    used = tuple(one for key, one in SOURCES.items() if cited(key) in text)
-    software = _software(versions)
-    text = f"{text} Simulated and analysed with {enumeration([_program(one) for one in software])}."
-    listed = Bullets(tuple(map(reference_text, (*used, *software))))
-    note = Text("Ready to paste; its sources are in `references.bib` beside this report.")
-    return Section("Methods", (Text(text), note, listed)), (*used, *software)
-
-
-def reference_text(one: Reference) -> str:
-    """A source as a line of a list."""
-    fields = one.fields
-    if one.kind != "article":
-        return f"{fields['title']} {fields.get('version', '')}".strip()
-    names = re.sub(r" and (?=.* and )", "; ", fields["author"])
-    doi = f" doi:{fields['doi']}" if "doi" in fields else ""
-    return (
-        f"{names} ({fields['year']}): {fields['title']}. {fields['journal']} {fields['volume']}:{fields['pages']}.{doi}"
+def bench_methods(result: LabResult, versions: Mapping[str, str | None]) -> Methods:
+    """The paragraph of a bench test: its standard, every formula with n, and how replicates were summed up."""
+    found = [one for one in result.derived if one.name not in CONDITIONS]
+    formulas: dict[tuple[str, str], list[str]] = {}
+    for one in found:
+        formulas.setdefault((one.name.replace("_", " "), one.formula), []).append(
+            f"{'–'.join(one.of).replace('_', ' ')} (n = {one.summary.n})"
+        )
+    text = f"The readings are of the bench test {result.test.replace('_', ' ')}: {TESTS[result.test].layout.standard}."
+    clauses = [f"{name} by {formula} of {enumeration(of)}" for (name, formula), of in formulas.items()]
+    clauses += [
+        f"{one.name.replace('_', ' ')} by {one.formula} of {'–'.join(one.of).replace('_', ' ')}"
+        for one in result.estimates
+    ]
+    text += f" Evaluated were {'; '.join(clauses)}."
+    if any(isinstance(curve.fit, LinearRange) for curve in result.curves):
+        text += (
+            " Of every force–displacement curve the slope was taken from the window that spans the most force while "
+            f"each of its fifths stays within {percent(STRAIGHTNESS, 1)} of its force of a line."
+        )
+    if any(isinstance(curve.fit, HertzRange) for curve in result.curves):
+        text += f" Curved bodies were fitted by Hertz’s law{citations(('hertz1882',))} up to yield."
+    several = any(one.summary.outlier_test != "Grubbs" for one in found)
+    text += (
+        " Means stand with their standard deviation and 95 % interval by Student’s t; normality was tested"
+        f"{citations(('shapiro1965',))}, and outliers at the 5 % level"
+        f"{citations(('rosner1983',) if several else ('grubbs1969',))}, of which none was removed."
     )
+    if any(one.name == "size_spread" for one in result.estimates):
+        text += f" The interval of the spread of sizes is McKay’s, modified{citations(('vangel1996',))}."
+    if any(one.reading is not None for one in found):
+        text += (
+            " The ± of readings was taken as rectangular and carried into every quantity by the law of propagation"
+            f"{citations(('gum2008',))}."
+        )
+    return methods_section(text, _without_solver(versions), "Evaluated")
 
 
-def _software(versions: Mapping[str, str | None]) -> tuple[Reference, ...]:
-    return tuple(
-        Reference(f"software-{name}", "misc", {"title": name, "version": version, "howpublished": "Computer program"})
-        for name, version in versions.items()
-        if version and name != "physics"
+def photograph_methods(result: PhotographResult) -> Methods:
+    """The paragraph of photographed piles: how the angle was read, from which base line, on which scale."""
+    lines = enumeration(list(dict.fromkeys(pile.base_from for pile in result.piles if pile.base_from)))
+    n, lost = len(result.piles), len(result.refused)
+    text = (
+        f"{'One photograph' if n + lost == 1 else f'{n + lost} photographs'} of piles from the side: {n} read, {lost} "
+        "refused. The silhouette was told from its background by its grey levels, its edge placed "
+        "between pixels, and a least-squares line laid through the tops of all columns of each flank between 20 and "
+        "80 % of the pile’s height; the angle of repose is the mean of both flanks over the base line"
+        f"{f' (from {lines})' if n and lines != 'none' else ''}. ± is two standard errors: level of the edge, tilt, "
+        "window of the fit and pixels, a bend of the flank beyond its roughness, and what is not known of lens and "
+        "camera."
     )
+    scales = dict.fromkeys(f"{number(1e3 * one.pixel, 4)} mm" for one in result.piles if one.unit == "m" and one.pixel)
+    if scales:
+        text += f" A pixel is {enumeration(list(scales))}, as stated."
+    if n > 1:
+        text += f" The interval of the mean over {n} pictures is by Student’s t."
+    return methods_section(text, _without_solver(result.versions), "Read")
 
 
-def _program(one: Reference) -> str:
-    return f"{one.fields['title']} {one.fields['version']}"
+def design_methods(result: DesignResult) -> Methods:
+    """The paragraph of an analysed design: the runs, and the tests and models that their analysis used."""
+    found, runs = result.analysis, result.runs
+    family = _family(result.design)
+    text = (
+        f"{runs.valid} runs at {runs.rows} settings of {len(result.factors)} factors"
+        f"{f', a {family} design' if family else ''}{citations(DESIGNS.get(family, ()))}, were analysed for "
+        f"{result.response.name.replace('_', ' ')}; {runs.missing} had no result."
+    )
+    if found.effects is not None:
+        text += (
+            f" Effects were tested against the {found.effects.screening.error_source}, corrected by Holm’s procedure"
+            f"{citations(('holm1979',))}, and held against Lenth’s margin{citations(('lenth1989',))}."
+        )
+    if found.model is not None:
+        anova = found.model.anova
+        terms = int(found.model.surface.included.sum()) - 1
+        text += (
+            f" A polynomial of {terms} terms was fitted by least squares{citations(('myers2016',))}; sums of squares "
+            f"are partial (Type III). R² is {fixed(anova.r_squared, 4)}, "
+            f"predicted {fixed(anova.r_squared_predicted, 4)}."
+        )
+    if found.mixture is not None:
+        text += f" Scheffé’s polynomial{citations(('scheffe1958',))} stands for the model of the mixture."
+    if "--reduce" in result.command:
+        text += f" Terms were dropped one by one, by AICc{citations(('hurvich1989',))} or p."
+    if found.optimum is not None:
+        text += f" Settings for {observed(result.response.path, found.optimum.target)} were looked for in the model."
+    return methods_section(text, _without_solver(result.versions), "Analysed")
+
+
+def plan_methods(result: PlanResult) -> Methods:
+    """The paragraph of a planned experiment: family, size, order of the runs, and what it will see."""
+    family = _family(result.design)
+    text = (
+        f"A {family} design{citations(DESIGNS.get(family, ()))} of {len(result.coded)} rows over "
+        f"{len(result.factors)} factors was made, {result.replicates} runs of each: {len(result.sequence)} runs"
+        f"{f' in {max(result.block)} blocks' if result.block else ''}. Order of the runs and whatever of the design is "
+        f"drawn: seed {result.seed}."
+    )
+    if result.power:
+        text += (
+            f" The smallest change that the {result.model} model will see with a chance of 0.8 at p < 0.05 is that "
+            f"of the noncentral t{citations(('cohen1988',))}"
+            f"{f', for a standard deviation of one run of {number(result.sigma)}' if result.sigma else ''}."
+        )
+    return methods_section(text, _without_solver(result.versions), "Made")
+
+
+def audit_methods(audit: Audit, what: str, versions: Mapping[str, str | None]) -> Methods:
+    """The paragraph of an audit: of what, by which checks, and how it grades."""
+    source = audit.source or "no source stated"
+    checks = list(dict.fromkeys(figure.check for figure in audit.figures))
+    text = (
+        f"The printed tables of “{audit.title}” ({source}) were audited: {len(audit.figures)} figures by "
+        f"{len(checks)} checks ({enumeration(checks)}). {what}"
+    )
+    return methods_section(text, _without_solver(versions), "Recomputed")
+
+
+def _without_solver(versions: Mapping[str, str | None]) -> dict[str, str | None]:
+    return {name: version for name, version in versions.items() if name not in WITHOUT_SOLVER}
+
+
+def _family(design: str) -> str:
+    """What a sentence calls a design, "" where a sheet does not say."""
+    return FAMILIES[design].title if design in FAMILIES else design
 
 
 def _model(result: StudyResult) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
+from PIL import Image
 from scipy import stats
 
 from doe.provenance import About
@@ -30,13 +31,16 @@ from explorer.report.content import (
     Word,
 )
 from explorer.report.figures.style import ASSUMPTION, CHOSEN, FACTOR, TARGET, axis, chart, label, line
-from explorer.tables.photograph import lens_words, thirds_words
+from explorer.report.methods import photograph_methods
+from explorer.tables.photograph import BASES, lens_words, thirds_words
 from explorer.units import MISSING, fixed, number
 from solver.photograph import PhotographedPile, Refusal, open_picture
 from solver.photograph.reading_error import COVERAGE
 
 MOST_POINTS = 500
 """Of an outline."""
+MOST_BYTES = 1_500_000
+"""Of a picture, so that the page stays below 5 MB with the library of its charts and the letters of base64."""
 COLOURS = (FACTOR, ASSUMPTION, TARGET, CHOSEN)
 READ = "read"
 """Name of the picture with what was read."""
@@ -61,6 +65,18 @@ class ReadPile(Record):
     """Angles of the lower, the middle and the upper third of the fit [°]."""
     lens: float = 0.0
     """k of the lens that was taken out of the picture; 0: none."""
+    size: tuple[int, int] = (0, 0)
+    """Of the picture [px]: columns, rows."""
+    pixel: float = 0.0
+    """Length of a pixel in ``unit``."""
+    base: tuple[float, float] = (math.nan, math.nan)
+    """y of the base line at the left and the right edge of the picture [px]."""
+    base_error: float = math.nan
+    """Standard error of its height [px]."""
+    base_from: str = ""
+    """What the base line was found by, in words."""
+    parts: dict[str, float] = field(default_factory=dict)
+    """Source → its standard error of the mean angle [°]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,6 +91,8 @@ class PhotographResult(Document):
     refused: dict[str, str]
     versions: dict[str, str | None]
     about: About = field(default_factory=About)
+    simulated: str = ""
+    """What was poured beside it, if anything."""
 
     @property
     def over_pictures(self) -> tuple[float, float, float]:
@@ -93,63 +111,116 @@ def photograph_result(measured: MeasuredPhotographs, author: str, notes: str) ->
         refused={one.name: f"{one.reason}: {one.detail}" for one in measured.readings if isinstance(one, Refusal)},
         versions=versions(),
         about=made_today(author, notes),
+        simulated=measured.simulated.source if measured.simulated else "",
     )
 
 
 def read_picture(order: MeasureOrder, measured: MeasuredPhotographs) -> bytes:
-    """The pictures with what was read, as PNG."""
+    """The pictures with what was read, as PNG of at most ``MOST_BYTES``."""
+    pictures = [open_picture(path) for path in order.pictures]
+    return png_within(MOST_BYTES, sheet(pictures, measured.readings, measured.simulated, thirds=True))
+
+
+def png_within(most: int, picture: Image.Image) -> bytes:
+    """A picture as PNG of at most ``most`` bytes, made smaller until it is."""
+    while len(found := _png(picture)) > most:
+        size = round(0.8 * picture.width), round(0.8 * picture.height)
+        picture = picture.resize(size, Image.Resampling.LANCZOS)
+    return found
+
+
+def _png(picture: Image.Image) -> bytes:
     file = io.BytesIO()
-    sheet([open_picture(path) for path in order.pictures], measured.readings, measured.simulated).save(file, "PNG")
+    picture.save(file, "PNG")
     return file.getvalue()
 
 
 def photograph_report(result: PhotographResult, picture: bytes | None) -> Report:
     """The report; ``picture`` is what :func:`read_picture` gave, None where it is lost."""
     names = ", ".join([*(pile.name for pile in result.piles), *result.refused])
-    blocks: list[Block] = [_angles(result)]
+    blocks: list[Block] = [_angles(result)] if result.piles else []
     if picture is not None:
+        over = "the outline, both flank lines and the base line drawn over them: " if result.piles else "no angle: "
         blocks.append(
             Picture(
                 READ,
                 picture,
-                f"Photographs of piles with the outline, both flank lines and the base line drawn over them: {names}",
-                f"n = {len(result.piles) + len(result.refused)} pictures, read by one silhouette each. White: outline; "
-                "orange: flank lines (least squares); blue: base line.",
+                f"Photographs of piles with {over}{names}",
+                f"{_counted(result)} {_drawn(result)}".strip(),
             )
         )
+    methods, references = photograph_methods(result)
     sections = [Section("Angle of repose", tuple(blocks))]
     if result.piles:
         sections.append(Section("Outlines", (Figure("outlines", outlines(result), _outline_words(result)),)))
     if result.refused:
         lines = tuple(f"{name}: {why}" for name, why in result.refused.items())
         sections.append(Section("Pictures without an angle", (Bullets(lines),)))
+    inputs = tuple(table for table in (_inputs(result), _parts(result)) if table.rows)
+    sections += [Section("What was read off", inputs)] if inputs else []
     data = DataTable(
         "outlines",
         ("picture", "unit", "u", "z"),
         tuple((pile.name, pile.unit, u, z) for pile in result.piles for u, z in zip(pile.u, pile.z, strict=True)),
     )
-    return Report("Angle of repose on photographs", names, banner(result), tuple(sections), result.about, (data,))
+    angles = DataTable(
+        "angles",
+        ("picture", "flank", "angle_deg", "plus_minus_95_deg", "lower_deg", "middle_deg", "upper_deg", "refused"),
+        (
+            *(
+                (pile.name, flank, *value, *(thirds or (None,) * 3), None)
+                for pile in result.piles
+                for flank, value, thirds in (
+                    ("left", pile.left, pile.left_thirds),
+                    ("right", pile.right, pile.right_thirds),
+                    ("mean", pile.mean, ()),
+                )
+            ),
+            *((name, *[None] * 6, why) for name, why in result.refused.items()),
+        ),
+    )
+    return Report(
+        "Angle of repose on photographs",
+        names,
+        banner(result),
+        (*sections, methods),
+        result.about,
+        (angles, data),
+        references,
+    )
+
+
+def _counted(result: PhotographResult) -> str:
+    n = len(result.piles) + len(result.refused)
+    return "n = 1 picture, read by its silhouette." if n == 1 else f"n = {n} pictures, read by one silhouette each."
+
+
+def _drawn(result: PhotographResult) -> str:
+    """What the lines on the pictures are."""
+    if not result.piles:
+        return "None was read, and nothing is drawn."
+    lines = "White: outline; orange: flank lines (least squares); green: their thirds; blue: base line."
+    return f"{lines} Lowest: the simulated pile {result.simulated}." if result.simulated else lines
 
 
 def banner(result: PhotographResult) -> Banner:
     """The angle with its spread over pictures, or that there is none."""
     n, lost = len(result.piles), len(result.refused)
     if n == 0:
+        first, why = next(iter(result.refused.items()))
         return Banner(
-            Word.NO_ANSWER,
+            Word.REFUSED,
             "",
-            f"None of {lost} pictures shows a pile that can be read.",
-            "See below why, and take them again.",
+            f"{first}: {why}" if lost == 1 else f"None of {lost} pictures shows a pile that can be read.",
+            "Take the picture again as its refusal says." if lost == 1 else "Take them again as their refusals say.",
         )
     mean, sd, half = result.over_pictures
     beside = f" {lost} more show none that can be read." if lost else ""
     if n == 1:
         return Banner(
             Word.MEASURED,
-            f"{fixed(mean)}°",
-            f"One picture, read to ± {fixed(result.piles[0].mean[1])}° (95 % of reading this silhouette); how far "
-            "pours differ it "
-            f"cannot say.{beside}",
+            f"{fixed(mean)} ± {fixed(result.piles[0].mean[1])}°",
+            f"One picture; ±: 95 % of reading this silhouette. How far pours differ it cannot say.{beside}",
             "Photograph four more pours: a study needs the standard deviation between them.",
         )
     return Banner(
@@ -183,9 +254,9 @@ def outlines(result: PhotographResult) -> Spec:
 
 
 def _outline_words(result: PhotographResult) -> str:
-    return (
-        f"n = {len(result.piles)} piles, the upper edge of each silhouette over its base line, both axes on one scale."
-    )
+    n = len(result.piles)
+    piles = "pile" if n == 1 else "piles"
+    return f"n = {n} {piles}, the upper edge of each silhouette over its base line, both axes on one scale."
 
 
 def _angles(result: PhotographResult) -> Table:
@@ -216,11 +287,53 @@ def _angles(result: PhotographResult) -> Table:
     )
 
 
+def _inputs(result: PhotographResult) -> Table:
+    """Size, scale and base line of every picture, as stated or as found."""
+    rows = tuple(
+        (
+            pile.name,
+            f"{pile.size[0]} × {pile.size[1]}",
+            f"{number(1e3 * pile.pixel, 4)} mm" if pile.unit == "m" else MISSING,
+            fixed(pile.base[0], 1),
+            fixed(pile.base[1], 1),
+            fixed(pile.base_error),
+            pile.base_from,
+            number(pile.lens),
+        )
+        for pile in result.piles
+        if pile.size[0]
+    )
+    header = (
+        "picture",
+        "size [px]",
+        "a pixel is",
+        "base line left [px]",
+        "base line right [px]",
+        "its standard error [px]",
+        "found by",
+        "lens k",
+    )
+    return Table(
+        header, rows, "Base line: from the top, at both edges of the picture. Scale: as stated, taken as exact."
+    )
+
+
+def _parts(result: PhotographResult) -> Table:
+    """What the ± of the mean is made of."""
+    names = list(dict.fromkeys(name for pile in result.piles for name in pile.parts))
+    rows = tuple(
+        (pile.name, *(fixed(pile.parts.get(name), 3) for name in names)) for pile in result.piles if pile.parts
+    )
+    header = ("standard errors of the mean [°]", *(name.replace("_", " ") for name in names))
+    return Table(header, rows, "Taken as independent; ± is two standard errors of all together.")
+
+
 def _read(pile: PhotographedPile) -> ReadPile:
     step = max(1, -(-pile.outline.u.size // MOST_POINTS))
     left, right, mean = (
         (one.value_deg, COVERAGE * one.error_deg) for one in (pile.angles.left, pile.angles.right, pile.angles.mean)
     )
+    ends = pile.base.at(np.array([0.0, pile.size[0] - 1.0]))
     return ReadPile(
         pile.name,
         pile.unit,
@@ -234,4 +347,10 @@ def _read(pile: PhotographedPile) -> ReadPile:
         pile.angles.left.thirds_deg,
         pile.angles.right.thirds_deg,
         pile.lens,
+        size=pile.size,
+        pixel=pile.pixel,
+        base=(float(ends[0]), float(ends[1])),
+        base_error=pile.base.offset_error,
+        base_from=BASES[pile.base.kind],
+        parts=dict(pile.angles.mean.parts_deg),
     )

@@ -401,11 +401,15 @@ def _mark(marker: Json, colour: Any, opacity: float) -> Json:
 def _bar(axes: Axes, trace: Json, spec: Spec, sides: tuple[Json, Json], order: float) -> None:
     place = _values(axes, trace["y"], "y", sides[1])
     group = [one for one in spec["data"] if one["type"] == "bar" and one.get("xaxis") == trace.get("xaxis")]
-    thick = (1.0 - spec["layout"].get("bargap", 0.2)) / len(group)
-    shift = (group.index(trace) - 0.5 * (len(group) - 1)) * thick
-    sizes = np.nan_to_num(np.array([math.nan if v is None else v for v in trace["x"]], dtype=float))
+    stacked_up = spec["layout"].get("barmode") == "stack"
+    thick = (1.0 - spec["layout"].get("bargap", 0.2)) / (1 if stacked_up else len(group))
+    shift = 0.0 if stacked_up else (group.index(trace) - 0.5 * (len(group) - 1)) * thick
+    sizes, *below = (
+        np.nan_to_num(np.array([math.nan if v is None else v for v in one["x"]], dtype=float))
+        for one in (trace, *(group[: group.index(trace)] if stacked_up else ()))
+    )
     colour = trace["marker"]["color"]
-    axes.barh(place + shift, sizes, height=thick, color=colour, zorder=order)
+    axes.barh(place + shift, sizes, height=thick, left=sum(below, np.zeros(len(place))), color=colour, zorder=order)
 
 
 def _contour(axes: Axes, trace: Json, spec: Spec, order: float) -> None:

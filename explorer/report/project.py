@@ -1,4 +1,5 @@
-"""One report of finished folders: a material's photographs, bench tests, designs, calibration, diagnosis and audit.
+"""One report of finished folders: the audit of a published study, and a material's photographs, bench tests, planned
+and analysed designs, calibration and diagnosis.
 
 A folder says by its result file what it is; its report is built anew from that file, so one of an older version of the
 program gets today's figures as well. Several are joined: the verdict of the last stage first, those of all in a table,
@@ -7,26 +8,30 @@ then every report in the order of the work.
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from doe.laboratory import LabResult
+from PIL import Image
+
 from doe.provenance import About
-from doe.record import Record
 from doe.studies.study_result import StudyResult
+from explorer.audit.report import AuditResult, audit_report
 from explorer.design.result import DesignResult
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.errors import CommandError
+from explorer.project.project import FILE, load_project
 from explorer.report import study_report
-from explorer.report.bench import bench_report
+from explorer.report.bench import BenchResult, bench_report
 from explorer.report.content import Banner, Block, Drawing, Figure, Folded, Picture, Report, Section, Strong, Table
 from explorer.report.design import design_report
+from explorer.report.design.plan import PlanResult, plan_report
 from explorer.report.diagnosis import diagnosis_report
 from explorer.report.figures.pours import outlines_caption, pile_outlines
-from explorer.report.photograph import READ, PhotographResult, photograph_report
+from explorer.report.photograph import MOST_BYTES, READ, PhotographResult, photograph_report, png_within
 
 Content = Mapping[str, Any]
 
@@ -40,20 +45,18 @@ class Part:
     report: Report
 
 
-@dataclass(frozen=True)
-class BenchFile(Record):
-    """The content of ``bench.json``."""
-
-    result: LabResult
-    about: About
-
-
 def _picture(folder: Path) -> bytes | None:
     pictures = sorted((folder / "figures").glob(f"figure_*_{READ}.png"))
     return pictures[0].read_bytes() if pictures else None
 
 
 KINDS: dict[str, tuple[str, Callable[[Content], bool], Callable[[Content], Any], Callable[[Any, Path], Report]]] = {
+    "Audit": (
+        AuditResult.NAME,
+        lambda _: True,
+        AuditResult.from_dict,
+        lambda result, _: audit_report(result),
+    ),
     "Photographs": (
         PhotographResult.NAME,
         lambda _: True,
@@ -61,10 +64,16 @@ KINDS: dict[str, tuple[str, Callable[[Content], bool], Callable[[Content], Any],
         lambda result, folder: photograph_report(result, _picture(folder)),
     ),
     "Bench test": (
-        "bench.json",
+        BenchResult.NAME,
         lambda _: True,
-        BenchFile.from_dict,
-        lambda file, _: bench_report(file.result, file.about),
+        BenchResult.from_dict,
+        lambda result, _: bench_report(result),
+    ),
+    "Planned runs": (
+        PlanResult.NAME,
+        lambda _: True,
+        PlanResult.from_dict,
+        lambda result, _: plan_report(result),
     ),
     "Design": (
         "result.json",
@@ -90,19 +99,43 @@ KINDS: dict[str, tuple[str, Callable[[Content], bool], Callable[[Content], Any],
 
 def part_of(folder: Path) -> Part:
     """What a folder holds; CommandError in one line where it is no finished result."""
-    for kind, (name, fits, read, report) in KINDS.items():
+    kind, content = _content(folder)
+    if not kind:
+        names = ", ".join(dict.fromkeys(name for name, *_ in KINDS.values()))
+        raise CommandError(f"{folder}: holds no finished result ({names})")
+    name, _, read, report = KINDS[kind]
+    try:
+        result = read(content)
+    except ValueError as problem:
+        raise CommandError(f"{folder / name}: {problem}") from None
+    return Part(kind, result, report(result, folder))
+
+
+def _content(folder: Path) -> tuple[str, Content]:
+    """Kind of a folder's result, and the content of its file; "" where it holds none."""
+    for kind, (name, fits, _, _) in KINDS.items():
         file = folder / name
         if not file.is_file():
             continue
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
-            if isinstance(content, dict) and fits(content):
-                result = read(content)
-                return Part(kind, result, report(result, folder))
         except ValueError as problem:
             raise CommandError(f"{file}: {problem}") from None
-    names = ", ".join(dict.fromkeys(name for name, *_ in KINDS.values()))
-    raise CommandError(f"{folder}: holds no finished result ({names})")
+        if isinstance(content, dict) and fits(content):
+            return kind, content
+    return "", {}
+
+
+def finished_folders(folder: Path) -> list[Path]:
+    """Folders with a result, the oldest first, of a project (`explorer.project`) in ``folder``; else itself alone."""
+    if not (folder / FILE).is_file():
+        return [folder]
+    project = load_project(folder)
+    places = dict.fromkeys(place.resolve() for place in (*project.reports, project.target))
+    found = [place for place in reversed(places) if _content(place)[0]]
+    if not found:
+        raise CommandError(f"{folder}: a project without a finished result")
+    return found
 
 
 def project_report(folders: list[Path], title: str, about: About) -> Report:
@@ -125,11 +158,12 @@ def project_report(folders: list[Path], title: str, about: About) -> Report:
         ),
     )
     sections = [Section("Verdicts", (verdicts,)), *_side_by_side(parts)]
+    parts = _with_small_pictures(parts)
     for k, part in enumerate(parts, start=1):
         sections += [_renamed(section, f"{k}. {part.kind}", f"part-{k}-") for section in part.report.sections]
     return Report(
         title=title or decisive.title,
-        subtitle=f"Project report: {', '.join(part.kind.lower() for part in parts)}",
+        subtitle=f"Project report: {', '.join(dict.fromkeys(part.kind.lower() for part in parts))}",
         banner=Banner(
             decisive.banner.word,
             decisive.banner.of,
@@ -145,6 +179,23 @@ def project_report(folders: list[Path], title: str, about: About) -> Report:
         ),
         references=tuple({one.key: one for part in parts for one in part.report.references}.values()),
     )
+
+
+def _with_small_pictures(parts: list[Part]) -> list[Part]:
+    """The parts with pictures that one page can hold together."""
+    n = sum(isinstance(one, Picture) for part in parts for one in part.report.shown.values())
+
+    def small(block: Block) -> Block:
+        if not isinstance(block, Picture) or n < 2:
+            return block
+        with Image.open(io.BytesIO(block.png)) as picture:
+            return replace(block, png=png_within(MOST_BYTES // n, picture))
+
+    def smaller(report: Report) -> Report:
+        sections = tuple(replace(one, blocks=tuple(map(small, one.blocks))) for one in report.sections)
+        return replace(report, sections=sections)
+
+    return [replace(part, report=smaller(part.report)) for part in parts]
 
 
 def _side_by_side(parts: list[Part]) -> list[Section]:

@@ -73,13 +73,13 @@ def _screening(result: AnyStudy) -> Named:
 
 def _scan(result: AnyStudy) -> Named:
     if result.scan is not None:
-        caption = "Band: the target and its margin of equivalence."
+        caption = "Band: the target, and how far off still counts as met."
         yield "Scan of an assumption", Plot(partial(scan, result.scan, result.study.targets[0]), caption)
 
 
 def _ascent(result: AnyStudy) -> Named:
     if result.ascent is not None:
-        caption = "Band: the target and its margin of equivalence; dotted: what the screening predicted."
+        caption = "Band: the target, and how far off still counts as met; dotted: what the screening predicted."
         yield "Ascent path", Plot(partial(ascent_path, result.ascent, result.study.targets[0]), caption)
 
 
@@ -112,7 +112,7 @@ def _optimum(result: AnyStudy) -> Named:
         return
     targets = fitted_targets(result)
     if len(targets) > 1:
-        caption = "Full: the model gives the target; dotted: ± margin; filled: every target within its margin."
+        caption = "Full: the model gives the target; dotted: as far off as still counts as met; filled: all are met."
         yield "Targets over each other", Plot(lambda: stacked(overlaid(targets)), caption, 2.2)
     if (joint := found.posterior) is not None:
         told = "all targets leave" if len(targets) > 1 else "the target leaves"
@@ -132,7 +132,7 @@ def optimum_plots(fitted: FittedTarget, optimum: OptimumResult) -> Named:
 def _verification(result: AnyStudy) -> Named:
     if result.verification is not None:
         for index, of in enumerate(_of_targets(result)):
-            caption = "Band: the margin of equivalence around the measured mean."
+            caption = "Band: around the measured mean, how far off still counts as met."
             yield f"Verification{of}", Plot(partial(verification, result.verification, index), caption)
 
 

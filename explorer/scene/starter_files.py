@@ -10,9 +10,10 @@ import tomllib
 from pathlib import Path
 
 from explorer.errors import CommandError
-from explorer.scene.file import load_scene
+from explorer.scene.file import load_scene, material_scene
 from solver import Parameter, Scene, is_material, parameters, read_toml, value
 from solver.assets import shipped_assets
+from solver.rigs.lifting_cylinder import LiftingCylinder
 from solver.scenes.material_file import scene_from
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
@@ -21,6 +22,8 @@ STUDY_ENDING = "_study"
 SPAN = 0.2
 """Half the width of a factor's range, as a fraction of its reference."""
 MOST_FACTORS = 8
+CUT = "\n#---\n"
+"""Between the parts of a study that depend on its rig."""
 
 
 def write_material(folder: Path, name: str) -> Path:
@@ -49,12 +52,12 @@ def write_study(folder: Path, name: str, material: str | None) -> list[Path]:
         raise CommandError(f"{study}: exists already; choose another name")
     if material is not None:
         named = material if _is_shipped(material) else str(Path(material).expanduser().absolute())
-        return [write_new(study, study_text(study, named, load_scene("funnel", material)))]
+        return [write_new(study, study_text(study, named, study_scene(material)))]
     own = folder / f"{name}.toml"
     if own.exists() and not is_material(read_toml(own)):
         raise CommandError(f"{own} is there and is not a material; choose another name, or name one with --material")
     written = [] if own.exists() else [write_material(folder, name)]
-    return [*written, write_new(study, study_text(study, own.name, load_scene("funnel", str(own))))]
+    return [*written, write_new(study, study_text(study, own.name, study_scene(str(own))))]
 
 
 def material_text(path: Path) -> str:
@@ -65,6 +68,12 @@ def material_text(path: Path) -> str:
 def starter_scene(path: Path) -> Scene:
     """The scene of the material file that :func:`write_material` would write as ``path``."""
     return scene_from(tomllib.loads(material_text(path)), path)
+
+
+def study_scene(material: str) -> Scene:
+    """What a new study of ``material`` pours: its own rig where that is a lifted cylinder, otherwise the funnel."""
+    own = material_scene(material)
+    return own if isinstance(own.rig, LiftingCylinder) else load_scene("funnel", material)
 
 
 def study_text(path: Path, material: str, scene: Scene) -> str:
@@ -80,7 +89,26 @@ def study_text(path: Path, material: str, scene: Scene) -> str:
         FILE=path.name,
         MATERIAL=material,
         FACTORS=factors,
+        **_rig_words(scene),
     )
+
+
+def _rig_words(scene: Scene) -> dict[str, str]:
+    """What of a study depends on its rig: set-up, assumptions, declared change and scan, poured masses [kg]."""
+    words = {"QUICK_MASS": "0.012", "MASS": "0.030"}
+    template = "study_in_funnel.toml"
+    if isinstance(scene.rig, LiftingCylinder):
+        # A cylinder that holds less than its heap needs leaves a flat layer: every profile pours all of it.
+        words = dict.fromkeys(words, f"{scene.rig.mass:g}")
+        template = "study_in_cylinder.toml"
+    numbers = {"RIG": scene.rig.name} | {
+        f"{word}{path.split('.')[1].upper()}": f"{share * float(value(scene, path)):.6g}"
+        for path in ("insertion.rate", "insertion.drop_speed", "rig.lift_speed")
+        if path in parameters(scene)
+        for word, share in (("HALF_", 0.5), ("", 1.0), ("TWICE_", 2.0))
+    }
+    parts = _filled(template, **numbers).rstrip("\n").split(CUT)
+    return words | dict(zip(("SET_UP", "SCREENED", "CHANGED"), parts, strict=True))
 
 
 def factor_paths(scene: Scene) -> list[str]:

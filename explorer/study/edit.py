@@ -1,4 +1,5 @@
-"""A study with other ranges and another target: the study's file, changed, as a file of its own.
+"""A study with other ranges and another target: the study's file, changed, as a file of its own; or what was measured,
+written into the file itself.
 
 What is changed is given by the names of factors and, for the first target, by its keys; everything else stays as it is
 in the file, comments included. The result is read back by the loader of every study before anything is started.
@@ -6,6 +7,7 @@ in the file, comments included. The result is read back by the loader of every s
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,12 +16,17 @@ from typing import Any
 import tomlkit
 
 from doe.studies.study import Study, study_from
+from doe.target import Target
 from explorer.errors import CommandError
 from solver import ParameterError, asset_path, read_toml
 from solver.assets import shipped_assets
 
 TARGET_KEYS = ("mean", "sd", "n", "margin")
 RANGE_KEYS = ("low", "high", "reference")
+MEASURED_KEYS = ("mean", "sd", "n", "sd_source")
+"""Keys of a target that a measurement replaces; its weight and margin are a decision and stay."""
+TARGET_LINE = re.compile(r"\s*\[\[\s*target\s*\]\]")
+KEY_LINE = re.compile(r"""(\s*)(\w+)(\s*=\s*)("[^"]*"|'[^']*'|[^\s#]+)(.*)""", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -78,3 +85,63 @@ def _heading(file: Path, edits: StudyEdits) -> str:
     changed = [*(name for name, values in edits.factors.items() if values), *(["target"] if edits.target else [])]
     how = f"changed on the page: {', '.join(changed)}" if changed else "as it was started on the page"
     return f"# {file.name}, {how}. SI unless a unit is written.\n\n"
+
+
+def remeasured(file: Path, target: Target, note: str) -> str:
+    """Text of the study ``file``, in which ``target`` has the place of the one of its observable.
+
+    Only the lines of ``MEASURED_KEYS`` change; what stands behind a value, and the ends of lines, stay. ``note``
+    becomes a comment above ``mean``, in the place of an earlier one that begins with the same word.
+
+    Raises CommandError in one line where the file does not write that target with a line for each key.
+    """
+    before = read_toml(file)
+    place = next(k for k, one in enumerate(before["target"]) if one["observable"] == target.observable)
+    values = {key: value for key in MEASURED_KEYS if (value := getattr(target, key)) is not None}
+    lines = file.read_bytes().decode("utf-8").splitlines(keepends=True)
+    heads = [k for k, line in enumerate(lines) if TARGET_LINE.match(line)]
+    wanted = {key: value for key, value in before["target"][place].items() if key not in MEASURED_KEYS} | values
+    if place < len(heads):
+        first = heads[place] + 1
+        last = next((k for k in range(first, len(lines)) if lines[k].lstrip().startswith("[")), len(lines))
+        lines[first:last] = _remeasured_lines(lines[first:last], values, f"# {note}")
+    text = "".join(lines)
+    try:
+        now = tomlkit.parse(text.removeprefix("\ufeff")).unwrap()
+    except ValueError:
+        now = {}
+    targets = [*before["target"][:place], wanted, *before["target"][place + 1 :]]
+    if now != {**before, "target": targets}:
+        raise CommandError(f"{file}: target {target.observable}: allowed: a [[target]] with a line for each key")
+    study_from(now, file)
+    return text
+
+
+def _remeasured_lines(lines: list[str], values: Mapping[str, float | str], note: str) -> list[str]:
+    """The lines of a target with other ``values``: a missing key follows on ``mean``, one without a value goes."""
+    there = {match[2] for line in lines if (match := KEY_LINE.match(line))}
+    found: list[str] = []
+    for line in lines:
+        match = KEY_LINE.match(line)
+        if line.lstrip().startswith(note.partition(":")[0] + ":"):
+            continue
+        if not match or match[2] not in MEASURED_KEYS:
+            found.append(line)
+            continue
+        indent, key, equals, old, behind = match.groups()
+        behind, end = behind.rstrip("\r\n"), line[len(line.rstrip("\r\n")) :] or "\n"
+        if key == "mean":
+            found.append(f"{indent}{note}{end}")
+        if key in values:
+            new, comment = _toml(values[key]), behind.lstrip()
+            # A comment stays in its column where the new value leaves room.
+            gap = max(1, len(old) + len(behind) - len(comment) - len(new)) if comment else 0
+            found.append(f"{indent}{key}{equals}{new}{' ' * gap}{comment}{end}")
+        if key == "mean":
+            missing = [other for other in MEASURED_KEYS if other in values and other not in there]
+            found += [f"{indent}{other} = {_toml(values[other])}{end}" for other in missing]
+    return found
+
+
+def _toml(value: float | str) -> str:
+    return tomlkit.item(value).as_string()

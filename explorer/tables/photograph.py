@@ -12,7 +12,7 @@ from scipy import stats
 
 from explorer.tables.text_table import text_table
 from explorer.units import MISSING, fixed, signed
-from solver.photograph import PhotographedPile, Refusal
+from solver.photograph import Board, PhotographedPile, Refusal
 from solver.photograph.reading_error import COVERAGE, Angle
 
 if TYPE_CHECKING:
@@ -65,7 +65,10 @@ def measure_text(measured: MeasuredPhotographs) -> str:
             "differs by far more. Roughness: RMS distance of the outline from its lines. Thirds: slopes of the lower, "
             "middle and upper third of the fit."
         )
-        parts += [f"{pile.name}: {lens_words(pile.lens)}" for pile in measured.piles if pile.lens]
+        if measured.board is None:
+            parts += [f"{pile.name}: {lens_words(pile.lens)}" for pile in measured.piles if pile.lens]
+    if measured.board is not None:
+        parts.append(_board_words(measured.board))
     if len(measured.piles) > 1:
         parts.append(_over_pictures(measured.piles))
     if measured.simulated is not None:
@@ -85,6 +88,15 @@ def angle_words(value_deg: float, error_deg: float) -> str:
 def lens_words(k: float) -> str:
     """What was taken out of a picture that a lens had bent by ``k``."""
     return f"the lens bends the base line ({'barrel' if k < 0 else 'pincushion'}, k = {signed(k, 3)}): taken out"
+
+
+def _board_words(board: Board) -> str:
+    """What a checkerboard told of the lens."""
+    return (
+        f"checkerboard {board.name}: {board.corners} corners, k = {signed(board.bend.k, 4)} ± "
+        f"{COVERAGE * board.bend.error:.4f} (95 %), taken out of every picture; they miss a plane board by "
+        f"{board.miss:.2f} px (RMS)"
+    )
 
 
 def thirds_words(thirds_deg: Sequence[float | None]) -> str:
@@ -166,6 +178,17 @@ def measure_result(measured: MeasuredPhotographs) -> dict[str, Any]:
         ],
         "over_pictures": _over_result(measured.piles),
         "simulation": None if measured.simulated is None else _simulated_result(measured.simulated),
+        **({} if measured.board is None else {"checkerboard": _board_result(measured.board)}),
+    }
+
+
+def _board_result(board: Board) -> dict[str, Any]:
+    return {
+        "picture": board.name,
+        "corners": board.corners,
+        "lens_k": board.bend.k,
+        "error": board.bend.error,
+        "miss_px": board.miss,
     }
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from explorer.viewer.laboratory.analysis_panel import AnalysisPanel
 from explorer.viewer.laboratory.audit_panel import AuditPanel
 from explorer.viewer.laboratory.bench_panel import BenchPanel
 from explorer.viewer.laboratory.design_panel import DesignPanel
 from explorer.viewer.laboratory.laboratory_panel import LaboratoryPanel
+from explorer.viewer.laboratory.measured_data_panel import MeasuredDataPanel
 from explorer.viewer.laboratory.photograph_panel import PhotographPanel
 from explorer.viewer.laboratory.rig_panel import RigPanel
 from explorer.viewer.look.look_panel import LookPanel
@@ -18,6 +20,7 @@ from explorer.viewer.pour.chart import Chart
 from explorer.viewer.pour.controls_panel import ControlsPanel
 from explorer.viewer.pour.disturb_panel import DisturbPanel
 from explorer.viewer.pour.grain_panel import GrainPanel
+from explorer.viewer.pour.import_panel import ImportPanel
 from explorer.viewer.pour.live_panel import LivePanel
 from explorer.viewer.pour.motion_chart import MotionChart
 from explorer.viewer.pour.outline_panel import OutlinePanel
@@ -55,6 +58,7 @@ PANELS: Registry[type[Panel]] = Registry(
         ChangesPanel,
         ScenePanel,
         GrainPanel,
+        ImportPanel,
         RestartPanel,
         SecondPile,
         LookPanel,
@@ -67,7 +71,9 @@ PANELS: Registry[type[Panel]] = Registry(
         BenchPanel,
         RigPanel,
         PhotographPanel,
+        MeasuredDataPanel,
         DesignPanel,
+        AnalysisPanel,
         AuditPanel,
         ReportsPanel,
     ),

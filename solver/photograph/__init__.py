@@ -4,17 +4,20 @@ Beside `solver/observables/scan.py`, which does the same for a scanned pile, and
 sets and the command line read pictures by the same function. NumPy, SciPy and Pillow; no kernels.
 """
 
+from solver.photograph.checkerboard import Board, board_of
 from solver.photograph.picture import NotAPile, PhotographError, Picture, Reason, Refusal, open_picture
 from solver.photograph.read import PhotographedPile, read_photograph
 from solver.photograph.reference_bar import reference_pixels
 
 __all__ = [
+    "Board",
     "NotAPile",
     "PhotographError",
     "PhotographedPile",
     "Picture",
     "Reason",
     "Refusal",
+    "board_of",
     "open_picture",
     "read_photograph",
     "reference_pixels",

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from solver.photograph.picture import NotAPile, Reason
+from solver.photograph.support import rimless
 
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.bool_]
@@ -23,7 +24,8 @@ Kind = Literal["plate", "foot", "given", "support"]
 SHOULDER = 0.04
 """Share of the part's width, at either end, that is level where a plate shows beside the pile."""
 SLOPES = (0.08, 0.2)
-"""Most by which the rise over run of both ends differs, of a plate's and of one that goes on beyond the picture."""
+"""Most by which the rise over run of both ends differs, of a plate's and of one that goes on beyond the picture, beside
+the rounding to a pixel over an end."""
 INNER = 0.10
 """Share of the part's width at either end where the pile is too thin to tell its foot."""
 REACH = 6
@@ -66,10 +68,7 @@ class BaseLine:
 
 def rough_base_line(part: Image) -> BaseLine:
     """The base line of a mask's ``part``, to a pixel or so; NotAPile where it has none."""
-    columns = np.flatnonzero(part.any(axis=0))
-    rows, x = part.shape[0], columns.astype(np.float64)
-    tops = part.argmax(axis=0)[columns].astype(np.float64) - 0.5
-    bottoms = rows - part[::-1].argmax(axis=0)[columns] - 0.5
+    x, tops, bottoms = _edges(part)
     plate = _shoulders(x, tops, bottoms, bool(part[:, 0].any() and part[:, -1].any()))
     if plate is not None:
         return plate
@@ -81,7 +80,15 @@ def rough_base_line(part: Image) -> BaseLine:
             f"what stands out reaches the {where} edge of the picture, with no level plate on both sides of it; "
             "show the whole pile, and the plate's edge from its level; or state --baseline",
         )
-    return _foot(x, bottoms)
+    try:
+        return _foot(x, bottoms)
+    except NotAPile as reason:
+        # The rim of a glass that sticks out over the foot makes a bulge of it.
+        bare = rimless(part)
+        if reason.reason != Reason.CAMERA_LOOKS_DOWN or bare is part:
+            raise
+        x, _, bottoms = _edges(bare)
+        return _foot(x, bottoms)
 
 
 def sharp_base_line(grey: Array, rough: BaseLine, scale: float) -> BaseLine:
@@ -131,6 +138,14 @@ def check_tilt(line: BaseLine) -> None:
         )
 
 
+def _edges(part: Image) -> tuple[Array, Array, Array]:
+    """Columns of ``part``, and its upper and its lower edge there."""
+    columns = np.flatnonzero(part.any(axis=0))
+    tops = part.argmax(axis=0)[columns].astype(np.float64) - 0.5
+    bottoms = part.shape[0] - part[::-1].argmax(axis=0)[columns] - 0.5
+    return columns.astype(np.float64), tops, bottoms
+
+
 def _shoulders(x: Array, tops: Array, bottoms: Array, across: bool) -> BaseLine | None:
     """The line through the tops of both ends, if these are level stretches of one line; None otherwise.
 
@@ -144,7 +159,9 @@ def _shoulders(x: Array, tops: Array, bottoms: Array, across: bool) -> BaseLine 
     own = [np.polyfit(x[side], tops[side], 1)[0] for side in (slice(0, n), slice(-n, None))]
     misses = np.abs(tops[ends] - slope * x[ends] - offset)
     # A level stretch misses by pixel steps and noise; a flank's foot slopes one way on the left, another on the right.
-    level = np.median(misses) < 1.0 and np.percentile(misses, 90) < 2.5 and abs(own[0] - own[1]) < SLOPES[across]
+    level = (
+        np.median(misses) < 1.0 and np.percentile(misses, 90) < 2.5 and abs(own[0] - own[1]) < SLOPES[across] + 0.5 / n
+    )
     thick = np.median((bottoms - tops)[ends]) >= 3.0
     if not (level and thick):
         return None

@@ -94,6 +94,9 @@ def bend_of(grey: Array, part: Image, line: BaseLine, scale: float) -> Bend:
     ``part`` is of a mask with ``scale`` pixels of ``grey`` along one of its own.
     """
     columns = np.flatnonzero(part.any(axis=0))
+    if line.kind == "foot":
+        middles = (columns + 0.5) * scale - 0.5
+        columns = columns[(middles >= line.left - 0.5) & (middles <= line.right + 0.5)]
     if columns.size < 40:
         return UNKNOWN
     x = columns.astype(np.float64)

@@ -98,29 +98,43 @@ class PhotographedPile:
 
 
 def read_photograph(
-    picture: Picture, metres_per_pixel: float | None = None, base_line: tuple[float, float] | None = None
+    picture: Picture,
+    metres_per_pixel: float | None = None,
+    base_line: tuple[float, float] | None = None,
+    bend: lens.Bend | None = None,
 ) -> PhotographedPile | Refusal:
     """The pile in ``picture``, or why there is none.
 
     ``metres_per_pixel``: of the picture itself. ``base_line``: y [px of the picture] of the plate at its left and its
-    right edge; found by itself if None.
+    right edge; found by itself if None. ``bend``: of the lens, where a checkerboard told it (`checkerboard.py`); the
+    base line tells it if None.
     """
     try:
-        return _read(picture, metres_per_pixel, base_line)
+        if bend is None:
+            return _read(picture, metres_per_pixel, base_line)
+        if base_line is not None:
+            base_line = _unbent(picture, base_line, bend.k)
+        pile = _read(lens.straightened(picture, bend.k), metres_per_pixel, base_line, replace(bend, k=0.0))
+        return replace(pile, lens=bend.k)
     except NotAPile as reason:
         return Refusal(picture.name, reason.reason, reason.detail)
 
 
-def _read(picture: Picture, metres_per_pixel: float | None, base_line: tuple[float, float] | None) -> PhotographedPile:
+def _read(
+    picture: Picture,
+    metres_per_pixel: float | None,
+    base_line: tuple[float, float] | None,
+    known: lens.Bend | None = None,
+) -> PhotographedPile:
     if base_line is not None:
         left, right = picture.index(np.array(base_line))
         given = given_base_line(float(left), float(right), picture.grey.shape[1])
         found, scale = find_pile(picture.grey, given)
-        return _measured(picture, found, scale, given, lens.UNKNOWN, metres_per_pixel)
+        return _measured(picture, found, scale, given, known or lens.UNKNOWN, metres_per_pixel)
     found, scale = find_pile(picture.grey, None)
     grey = picture.grey.astype(np.float64)
     line = sharp_base_line(grey, found.line, scale)
-    bend = lens.bend_of(grey, found.candidate.part, line, scale)
+    bend = known or lens.bend_of(grey, found.candidate.part, line, scale)
     if not bend.sure:
         return _measured(picture, found, scale, line, bend, metres_per_pixel)
     picture = lens.straightened(picture, bend.k)
@@ -128,6 +142,17 @@ def _read(picture: Picture, metres_per_pixel: float | None, base_line: tuple[flo
     line = sharp_base_line(picture.grey.astype(np.float64), found.line, scale)
     pile = _measured(picture, found, scale, line, replace(bend, k=0.0), metres_per_pixel)
     return replace(pile, lens=bend.k)
+
+
+def _unbent(picture: Picture, base_line: tuple[float, float], k: float) -> tuple[float, float]:
+    """The ends of a stated base line [px of the picture] in its straight copy."""
+    size = (picture.height, picture.width)
+    x = np.array([0.0, picture.width - 1.0])
+    u, v, half = lens.centred(x, np.array(base_line), size)
+    u, v = lens.straight(u, v, k)
+    slope = (v[1] - v[0]) / (u[1] - u[0])
+    left, right = (v[0] + slope * (lens.centred(x, x, size)[0] - u[0])) * half + 0.5 * (size[0] - 1)
+    return float(left), float(right)
 
 
 def _measured(

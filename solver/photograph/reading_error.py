@@ -59,7 +59,9 @@ CORNERS = tuple(np.linspace(0.08, 0.92, 15))
 SURE_BEND = 3.0
 """χ²/2 with two degrees of freedom at 95 %."""
 COARSE_DEG = 2.0
-"""Scatter of the thirds from which on a few large bodies make them, and they tell nothing of a bend."""
+"""Scatter of the thirds from which on a few large bodies make them, and they tell nothing of a bend,"""
+COARSE_SPREAD = 6.0
+"""unless they differ by so many times that: those of bodies do by up to 4."""
 UNSEEN_NEAR = 0.1
 """Half the width of the pile over the distance of the camera, where nothing tells it: five widths."""
 
@@ -173,9 +175,10 @@ def _bend_deg(thirds: Sequence[FlankLine | None], flank: FlankLine, tops: Array)
     miss = min(misses, key=np.linalg.norm)
     n = max(1.0, (1.0 + np.count_nonzero(np.diff(np.signbit(miss)))) / 3.0)
     scatter = np.sqrt(12.0 * np.mean(miss**2) / n) / (columns.size / 3.0) / (1.0 + flank.slope**2)
-    if np.degrees(scatter) > COARSE_DEG:
+    spread, scatter_deg = float(np.std(known, ddof=1)), float(np.degrees(scatter))
+    if scatter_deg > COARSE_DEG and spread < COARSE_SPREAD * scatter_deg:
         return 0.0
-    return float(np.sqrt(max(0.0, np.var(known, ddof=1) - SURE_BEND * np.degrees(scatter) ** 2)))
+    return float(np.sqrt(max(0.0, spread**2 - SURE_BEND * scatter_deg**2)))
 
 
 def _camera_deg(angle_deg: float, view: View) -> float:

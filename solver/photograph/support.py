@@ -13,6 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy import ndimage
+
+from solver.observables.silhouette import EIGHT_NEIGHBOURS
 
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.bool_]
@@ -43,6 +46,8 @@ LEAST_NECK = 0.15
 """Of the height: a body that sticks out of the apex is shorter."""
 THINNEST = 0.3
 """Of the width of the pile: a tip is thinner."""
+THIN, LONG = 0.15, 0.12
+"""Of the height, and of the width, of the pile: a rim is thinner, and sticks out farther on either side."""
 
 
 @dataclass(frozen=True)
@@ -107,6 +112,28 @@ def severed(part: Image) -> Image | None:
     cut = part.copy()
     cut[: rows[last] + 1] = False
     return cut
+
+
+def rimless(part: Image) -> Image:
+    """``part`` of a mask (row 0 on top) without a glass dish's rim: thin bars that stick out of both sides, with
+    nothing right under them."""
+    rows = np.flatnonzero(part.any(axis=1))
+    body = ndimage.binary_opening(part, np.ones((max(3, round(THIN * rows.size)), 1), dtype=bool))
+    columns = np.flatnonzero(body.any(axis=0))
+    if columns.size < 8:
+        return part
+    slope, offset = np.polyfit(columns, part.shape[0] - 1.0 - body[::-1].argmax(axis=0)[columns], 1)
+    labels, _ = ndimage.label(part & ~body, structure=EIGHT_NEIGHBOURS)
+    cut, sides = part.copy(), set()
+    for k, where in enumerate(ndimage.find_objects(labels), start=1):
+        y, x = np.nonzero(labels[where] == k)
+        y, x = y + where[0].start, x + where[1].start
+        thick = y.size / (np.ptp(x) + 1.0)
+        over_foot = float((slope * x + offset - y).mean()) - 0.5 * thick
+        if np.ptp(x) >= LONG * columns.size and over_foot > max(2.0, 0.5 * thick):
+            cut[y, x] = False
+            sides.add(x.mean() > columns.mean())
+    return cut if len(sides) == 2 else part
 
 
 def _reach(tops: Array, height: float) -> Array:

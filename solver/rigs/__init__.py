@@ -7,13 +7,14 @@ from solver.rigs.drop_plate_45 import DropPlate45
 from solver.rigs.funnel import Funnel
 from solver.rigs.inclined_plane import InclinedPlane
 from solver.rigs.lifting_cylinder import LiftingCylinder
+from solver.rigs.lipped_plate import LippedPlate
 from solver.rigs.mesh_funnel import MeshFunnel
 from solver.rigs.rig import BenchRig, PourRig, Rig
 from solver.rigs.rotating_drum import RotatingDrum
 from solver.rigs.surface import Plane, Revolved, Surface, SurfacePose, TriangleMesh
 
 RIGS: Registry[type[PourRig]] = Registry(
-    "rig", (Funnel, MeshFunnel, LiftingCylinder, DrawDownBox, RotatingDrum), derived_from(PourRig)
+    "rig", (Funnel, MeshFunnel, LiftingCylinder, LippedPlate, DrawDownBox, RotatingDrum), derived_from(PourRig)
 )
 BENCH_RIGS: dict[str, type[BenchRig]] = {
     "inclined_plane": InclinedPlane,

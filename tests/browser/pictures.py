@@ -268,7 +268,7 @@ def pour_pictures(view: Camera) -> None:
     view.take("pour_outline", 4.0)
     view.open("Controls")
     view.page.get_by_text("Pouring in the background").wait_for(state="hidden")
-    view.told(re.compile(r"over \d seeds"))
+    view.told(re.compile(r"SD \(\d seeds"))
     view.take("controls_population")
     slider(view.page, "Friction").focus()
     view.page.keyboard.press("Home")

@@ -11,6 +11,7 @@ from explorer.report.data import design_data
 from explorer.report.design.sections import banner, sections_of
 from explorer.report.html import page
 from explorer.report.markdown import document
+from explorer.report.methods import design_methods
 
 __all__ = ["design_html", "design_markdown", "design_report"]
 
@@ -25,6 +26,7 @@ def design_report(result: DesignResult) -> Report:
         sections=sections_of(result),
         about=result.about,
         data=design_data(result),
+        references=design_methods(result)[1],
     )
 
 

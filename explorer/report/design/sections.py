@@ -4,22 +4,27 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from doe.analysis.canonical import Canonical, RidgePath
 from doe.analysis.screening import Screening
-from doe.analysis.surface_anova import SurfaceAnova
+from doe.analysis.surface_anova import AnovaRow
 from doe.analysis.t_tests import Sample
 from doe.stages.surface import OptimumResult
 from explorer.design.result import DesignResult
 from explorer.report.content import Banner, Block, Caution, Code, Facts, Figure, Section, Table, Text, Word
 from explorer.report.design.charts import ridge
+from explorer.report.design.elementary import elementary, elementary_facts, elementary_words, told
+from explorer.report.design.groups import ACTS, group_facts, groups
 from explorer.report.design.model import blend_words, diagnostics, effects, mixture, model, units_of_factors
+from explorer.report.design.names import fit_facts, names, target_words
+from explorer.report.design.surrogate import better_words, surrogate, target_facts
 from explorer.report.figures.model import cloud, ranges
 from explorer.report.figures.surface import solutions
 from explorer.report.identified import GIVES_TARGET, cloud_caution, rule, settings
+from explorer.report.methods import design_methods
 from explorer.report.sections.optimum import ranges_caption
 from explorer.report.sections.surface import equation
 from explorer.units import (
@@ -196,6 +201,18 @@ def banner(result: DesignResult) -> Banner:
             if open_
             else "Run the setting found, a few times, and compare.",
         )
+    if found.surrogate_target is not None:
+        words = target_facts(result, found.surrogate_target)[0][1]
+        if not found.surrogate_target.reached:
+            return Banner(Word.OUT_OF_REACH, "", f"By the process: {words}.", "Make runs beyond low … high.")
+        of = observed(response, found.surrogate_target.target)
+        return Banner(Word.TARGET_REACHED, of, f"By the process: {words}.", "Run the setting found, and compare.")
+    if found.named is not None and result.target is not None and any(one.setting for one in found.named.groups):
+        words = target_words(result, found.named)
+        if not any(one.setting and one.setting.reached for one in found.named.groups):
+            what = f"The model gives {observed(response, result.target)} with {words}."
+            return Banner(Word.OUT_OF_REACH, "", what, "Make runs beyond low … high, or with other names.")
+        return Banner(Word.TARGET_REACHED, observed(response, result.target), f"With {words}.", "Run one of them.")
     acts = _acting_names(result)
     if acts:
         return Banner(
@@ -224,7 +241,13 @@ def acting_words(result: DesignResult) -> str:
             if row.p < 0.05
             else f"no change by the blend is seen (p = {p_value(row.p)})"
         )
-    return "no model could be fitted" if found.model is None else terms_that_act(found.model.anova)
+    if found.elementary is not None:
+        return elementary_words(found.elementary)
+    if found.random is not None:
+        return group_facts(result, found.random)[0][1]
+    if found.named is not None:
+        return terms_that_act(found.named.rows)
+    return "no model could be fitted" if found.model is None else terms_that_act(found.model.anova.rows)
 
 
 def _acting_names(result: DesignResult) -> list[str]:
@@ -237,9 +260,12 @@ def _acting_names(result: DesignResult) -> list[str]:
         return [e.name for e in screening.effects if not e.is_dummy and abs(e.effect) > screening.lenth.margin]
     if found.mixture is not None:
         return [factor.factor for factor in result.factors] if found.mixture.rows[0].p < 0.05 else []
-    if found.model is None:
-        return []
-    rows = [row for row in found.model.anova.rows if row.source not in WHOLE]
+    if found.elementary is not None:
+        return told(found.elementary)
+    if found.random is not None:
+        return [one.source.replace("*", " × ").replace("^2", "²") for one in found.random.tests if one.p < ACTS]
+    anova = found.model.anova if found.model is not None else found.named
+    rows = [] if anova is None else [row for row in anova.rows if row.source not in WHOLE]
     return [row.source.replace("*", " × ").replace("^2", "²") for row in rows if row.p < 0.05]
 
 
@@ -267,7 +293,7 @@ def in_short(result: DesignResult) -> Section:
             told = ", ".join(f"{name} {signed(effect)}" for name, effect in effects)
             facts.append(("Blocks", f"{told}; they add up to zero, and the model is their mean"))
         if found.effects is None:
-            facts.append(("Terms that act", terms_that_act(anova)))
+            facts.append(("Terms that act", terms_that_act(anova.rows)))
         coded, actual = equation(found.model.surface, result.factors, response)
         r2 = (anova.r_squared, anova.r_squared_adjusted, anova.r_squared_predicted)
         facts += [
@@ -285,6 +311,18 @@ def in_short(result: DesignResult) -> Section:
             ("R², adjusted, predicted", ", ".join(fixed(value, 4) for value in blends.shares_explained)),
             ("Scatter of one run", observed(response, blends.sigma)),
         ]
+    if found.surrogate is not None:
+        facts.append(("Predicts better", better_words(result)))
+    if found.surrogate_target is not None:
+        facts += target_facts(result, found.surrogate_target)
+    if found.elementary is not None:
+        facts += elementary_facts(result, found.elementary)
+    if found.random is not None:
+        facts += group_facts(result, found.random)
+    if found.named is not None:
+        facts += [("Terms that act", terms_that_act(found.named.rows)), *fit_facts(result, found.named)]
+        if result.target is not None:
+            facts.append(("Target", f"given by {target_words(result, found.named)}"))
     if found.optimum is not None:
         facts.append(("Target", found.optimum.statement))
     cautions: list[Block] = [Caution(text) for text in found.notes]
@@ -308,9 +346,9 @@ def acting(analysis: Screening) -> str:
     return f"beyond Lenth's margin {number(margin)}: {enumeration(beyond)}"
 
 
-def terms_that_act(anova: SurfaceAnova) -> str:
+def terms_that_act(rows: Sequence[AnovaRow]) -> str:
     """Terms of the model with p < 0.05, each alone."""
-    terms = [row for row in anova.rows if row.source not in WHOLE]
+    terms = [row for row in rows if row.source not in WHOLE]
     acting = [row.source.replace("*", " × ").replace("^2", "²") for row in terms if row.p < 0.05]
     if all(math.isnan(row.p) for row in terms):
         return "cannot be told without scatter"
@@ -320,14 +358,16 @@ def terms_that_act(anova: SurfaceAnova) -> str:
 def factor_table(result: DesignResult) -> Table:
     """Letters, names and ranges of the factors."""
     rows = tuple(
-        (
+        (factor.name, parameter_label(factor.path), enumeration(levels), MISSING, MISSING)
+        if levels
+        else (
             factor.name,
             parameter_label(factor.path),
             parameter_value(factor.path, factor.low),
             parameter_value(factor.path, factor.high),
             parameter_value(factor.path, factor.reference),
         )
-        for factor in result.factors
+        for factor, levels in zip(result.factors, result.names, strict=True)
     )
     return Table(("letter", "factor", "low (−1)", "high (+1)", "reference"), rows)
 
@@ -363,14 +403,24 @@ def repeat(result: DesignResult) -> Section:
     return Section("How to repeat", (Text(text), command, Table(("program", "version"), versions)))
 
 
+def methods(result: DesignResult) -> Section:
+    """The paragraph for a paper."""
+    return design_methods(result)[0]
+
+
 SECTIONS: tuple[Callable[[DesignResult], Section | None], ...] = (
     in_short,
     target,
     effects,
     mixture,
     model,
+    names,
+    groups,
+    elementary,
+    surrogate,
     diagnostics,
     shape,
     all_runs,
+    methods,
     repeat,
 )

@@ -254,7 +254,7 @@ def _sits(result: DiagnosisResult) -> str:
     worst = result.where[0]
     return (
         f"{percent(worst.share)} of the squared residual is in condition {worst.condition}; farthest off there "
-        f"is {feature_label(worst.feature)}, by {signed(worst.z, 1)} σ."
+        f"is {feature_label(worst.feature)}, by {signed(worst.z, 1)} standard errors."
     )
 
 

@@ -8,6 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from doe.analysis.canonical import Canonical
+from doe.analysis.named_factors import NameGroup
 from doe.analysis.surface import Surface
 from doe.analysis.surface_anova import AnovaRow, SurfaceAnova
 from doe.run_records import sample_of, valid_values
@@ -102,7 +103,7 @@ def surface(result: StudyResult) -> Section:
     return Section("Response surface", tuple(blocks))
 
 
-def equation(model: Surface, factors: Sequence[Factor], observable: str) -> tuple[str, str]:
+def equation(model: Surface | NameGroup, factors: Sequence[Factor], observable: str) -> tuple[str, str]:
     """The model as text, coded (x from −1 to +1) and in the units that people read."""
     unit = unit_of_observable(observable)
     terms, scales = _terms([factor.name for factor in factors], [unit_of_parameter(f.path).size for f in factors])

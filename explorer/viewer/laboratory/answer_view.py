@@ -23,7 +23,7 @@ from explorer.viewer.view import small_html
 TIED = re.compile(r"(?<=\d) (?=\S)")
 """The blank behind a number, which a narrow table must not break at."""
 LONGEST_ROW = 90
-"""Characters of a line in columns."""
+"""Characters of a line that is shown as it is."""
 NO_CHARTS = "Charts come with an answer that has any."
 
 
@@ -105,8 +105,9 @@ def answer_html(answer: CommandResult, kept: str = "") -> str:
 
 
 def _line_html(line: str) -> str:
-    """A line of columns stays as it is; one that is too long for columns is a sentence, and goes on below."""
-    style = " style='white-space:pre-wrap; overflow-wrap:anywhere'" if len(line) > LONGEST_ROW else ""
+    """A line of columns, between which are two blanks, stays as it is; another one that is long goes on below."""
+    sentence = len(line) > LONGEST_ROW and "  " not in line.strip()
+    style = " style='white-space:pre-wrap; overflow-wrap:anywhere'" if sentence else ""
     return f"<div{style}>{escape(line) or '&nbsp;'}</div>"
 
 

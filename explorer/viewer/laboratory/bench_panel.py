@@ -8,13 +8,15 @@ from typing import Any
 import viser
 
 from doe.laboratory import TESTS
+from doe.laboratory.bias import BIASED
 from doe.table_file import SUFFIXES
 from explorer.laboratory.command_results import bench_result, examples_of, template_file, twin_result
 from explorer.laboratory.part import measured_source
 from explorer.laboratory.run import LabOrder, analysed
+from explorer.laboratory.twin_row import RIGS
 from explorer.scene.source import SceneSource
 from explorer.viewer.laboratory.answer_view import AnswerView
-from explorer.viewer.laboratory.inputs import UploadSlot
+from explorer.viewer.laboratory.inputs import UploadSlot, parts_of
 from explorer.viewer.output.send_file import send_file
 from explorer.viewer.panel import LABORATORY, PageContext, Panel
 
@@ -51,10 +53,10 @@ class BenchPanel(Panel):
             SUFFIXES,
             folder,
             post,
-            "With shear: of the same components, for Poisson's ratio.",
+            "Of the same components, for Poisson's ratio.",
         )
         self._left_out = gui.add_text(
-            "Leave out", "", hint="With composition: components that are not poured; the rest is scaled to one."
+            "Leave out", "", hint="Components that are not poured, commas between; the rest is scaled to one."
         )
         self._twin = gui.add_checkbox(
             "Repeat it on the solver",
@@ -64,14 +66,14 @@ class BenchPanel(Panel):
         self._bias = gui.add_checkbox(
             "Where the formula misses",
             False,
-            hint="What the test's usual formula gives over a range of what was put in (drop, rebound, sieve, "
-            "compression, shear).",
+            hint="What the test's usual formula gives over a range of what was put in.",
         )
         evaluate = gui.add_button("Evaluate", hint="Mean, spread, interval, normality, outliers, parameters.")
         pour = gui.add_button(
             "Pour with these parameters", hint="The present material with what was measured, as a file of its own."
         )
-        self.view = AnswerView(server, WAITING, post, charts=True)
+        self.view = AnswerView(server, WAITING, post, charts=True, reports=page.project.laboratory)
+        self._follow(tests[0])
         evaluate.on_click(lambda _: post(self._evaluate))
         pour.on_click(lambda _: post(self._pour))
 
@@ -79,7 +81,7 @@ class BenchPanel(Panel):
         def _(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is not None:
                 test = str(event.target.value)
-                post(lambda: self._readings.offer(examples_of(test)))
+                post(lambda: self._choose(test))
 
         @sheet.on_click
         def _(event: viser.GuiEvent[Any]) -> None:
@@ -91,14 +93,25 @@ class BenchPanel(Panel):
         """Charts for a dark page, or a light one."""
         self.view.set_dark(dark)
 
+    def _choose(self, test: str) -> None:
+        self._readings.offer(examples_of(test))
+        self._follow(test)
+
+    def _follow(self, test: str) -> None:
+        """Ask for what the test takes."""
+        self._compression.visible = test == "shear"
+        self._left_out.visible = test == "composition"
+        self._twin.visible = test in RIGS
+        self._bias.visible = test in BIASED
+
     def _order(self) -> LabOrder:
         test, beside = str(self._test.value), self._compression.chosen
-        given = beside if test == "shear" and beside != NO_COMPRESSION else None
-        left_out = tuple(name for part in str(self._left_out.value).split(",") if (name := part.strip()))
-        return LabOrder(test, self._readings.chosen, given, left_out if test == "composition" else ())
+        given = beside if self._compression.visible and beside != NO_COMPRESSION else None
+        left_out = parts_of(str(self._left_out.value), ",") if self._left_out.visible else ()
+        return LabOrder(test, self._readings.chosen, given, left_out)
 
     def _evaluate(self) -> None:
-        order, twin, bias = self._order(), bool(self._twin.value), bool(self._bias.value)
+        order, twin, bias = self._order(), *(box.visible and bool(box.value) for box in (self._twin, self._bias))
         if not (twin or bias):
             self._background.start("evaluating the readings", lambda: bench_result(order), self.view.show)
             return

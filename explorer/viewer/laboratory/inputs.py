@@ -34,10 +34,15 @@ class UploadSlot:
         self._suffixes, self._folder, self._follow = tuple(suffixes), folder, follow
         self._sent: dict[str, Path] = {}
         self._examples = tuple(examples)
-        self._choice = server.gui.add_dropdown(label, self._examples, hint=hint)
-        self.upload = server.gui.add_upload_button(
-            f"Upload: {label.lower()}", mime_type=",".join(suffixes), hint=f"A file ending in {', '.join(suffixes)}."
-        )
+        # In a place of their own, as viser's client shows a button of uploads whether it is visible or not.
+        self._place = server.gui.add_folder(None)
+        with self._place:
+            self._choice = server.gui.add_dropdown(label, self._examples, hint=hint)
+            self.upload = server.gui.add_upload_button(
+                f"Upload: {label.lower()}",
+                mime_type=",".join(suffixes),
+                hint=f"A file ending in {', '.join(suffixes)}.",
+            )
 
         @self._choice.on_update
         def _(event: viser.GuiEvent[Any]) -> None:
@@ -52,6 +57,15 @@ class UploadSlot:
         """The name of an example, or the path of a file that was sent."""
         value = str(self._choice.value)
         return str(self._sent.get(value, value))
+
+    @property
+    def visible(self) -> bool:
+        """Whether the list and its button are shown."""
+        return bool(self._place.visible)
+
+    @visible.setter
+    def visible(self, shown: bool) -> None:
+        self._place.visible = shown
 
     def offer(self, examples: Sequence[str]) -> None:
         """Other examples than before; the first is chosen unless a file that was sent is."""
@@ -86,3 +100,19 @@ def number_or_none(text: str, what: str) -> float | None:
     if not math.isfinite(number):
         raise CommandError(f"{what} {text.strip()[:40]!r}: allowed is a number, or nothing")
     return number
+
+
+def whole_or_none(text: str, what: str, least: int, most: int | None) -> int | None:
+    """A whole number that a person typed, None for nothing; CommandError for anything else."""
+    number = number_or_none(text, what)
+    if number is None:
+        return None
+    if number != int(number) or not least <= number <= (math.inf if most is None else most):
+        allowed = f"{least} … {most}" if most is not None else f"{least} and more"
+        raise CommandError(f"{what} {text.strip()[:40]!r}: allowed is a whole number, {allowed}, or nothing")
+    return int(number)
+
+
+def parts_of(text: str, mark: str) -> tuple[str, ...]:
+    """What a person typed with ``mark`` between: names, terms, conditions."""
+    return tuple(part for one in text.split(mark) if (part := one.strip()))

@@ -247,7 +247,8 @@ class ScalingControl(LiveControl):
         hint = f"The values differ. All are multiplied by this factor, so that their ratios stay. {parameter.doc}"
         if parameter.scale == "log":
             bottom, top = (round(math.log10(end), POWER_DIGITS) for end in (max(low, 1.0 / LARGEST_POWER), high))
-            slider = gui.add_slider(f"{name} × 10^", bottom, top, LINEAR_STEP, 0.0, hint=hint)
+            hint = f"1 is ten times as much, −1 a tenth. {hint}"
+            slider = gui.add_slider(f"{name}, decades", bottom, top, LINEAR_STEP, 0.0, hint=hint)
             return (Face(slider, math.log10, lambda entered: 10.0 ** checked(entered, bottom, top, name)),)
         slider = gui.add_slider(f"{name} ×", low, high, LINEAR_STEP, 1.0, hint=hint)
         return (Face(slider, lambda factor: factor, lambda entered: checked(entered, low, high, name)),)

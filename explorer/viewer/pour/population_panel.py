@@ -205,7 +205,7 @@ def population_html(
         return _block("", lines)
     lines = [*lines, _compared_line(population, changed, comparison, former), _of_this_pour(population, pour)]
     sample = population.sample
-    head = "" if population.n < 2 else f"<b>{sample.mean:.1f} ± {sample.sd:.1f}°</b> over {population.n} seeds; "
+    head = "" if population.n < 2 else f"<b>{sample.mean:.1f} ± {sample.sd:.1f}°</b> SD ({population.n} seeds); "
     drawn = strip_svg(population, pour) if population.n else ""
     told = f"<div>{head}{_few(population)}</div>{drawn}"
     # While more are poured, that comes first: the box shows five lines.
@@ -277,9 +277,10 @@ def _few(population: Population) -> str:
     if n == 1:
         return f"One stored pour, {population.values[0]:.1f}°: how far seeds scatter is unknown." + lost
     low, high = population.interval
-    mean = f"mean {low:.1f} … {high:.1f}° (95 %)"
+    mean = f"mean 95 % {low:.1f} … {high:.1f}°"
     # Standard error of a standard deviation of normal values: σ/√(2(n − 1)).
-    return mean + (f"; few: the sd itself is ± {100 / math.sqrt(2 * (n - 1)):.0f} %." if n < TRUSTED else ".") + lost
+    few = f"; so few tell the SD to some {100 / math.sqrt(2 * (n - 1)):.0f} % only" if n < TRUSTED else ""
+    return f"{mean}{few}.{lost}"
 
 
 def _of_this_pour(population: Population, pour: ThisPour) -> str:
@@ -299,7 +300,8 @@ def _compared_line(population: Population, changed: str, found: Comparison | Non
         few = "one stored pour" if stored else "no stored pour"
         return f"{escape(changed)}: {few} of the former parameters; <b>{POUR_BOTH}</b> tells whether it is real."
     pours = "one pour" if population.n < 2 else f"{found.pours} pours"
-    sides = f"{found.difference:+.1f} ± {found.half_width:.1f}° (95 %)"
+    low, high = found.difference - found.half_width, found.difference + found.half_width
+    sides = f"{found.difference:+.1f}°, 95 % {low:+.1f} … {high:+.1f}°,"
     verdict = "distinguishable" if found.distinguishable else "not distinguishable"
     more = f"; {found.planned} pours of each would show {found.resolved:.1f}°"
     return f"{escape(changed)}: {sides} against {found.former} former: <b>{verdict} in {pours}</b>{more}."

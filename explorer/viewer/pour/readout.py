@@ -29,6 +29,7 @@ PHASE_WORDS = {
     Phase.RUN: "turning",
     Phase.AT_REST: "at rest",
 }
+SLOWER = "slow"
 STATE_WORDS = {
     SessionState.STARTING: "starting",
     SessionState.RUNNING: "running",
@@ -116,8 +117,8 @@ def readout_html(status: Status, by_component: bool = True, doubt: str = "", for
 
 
 def condition(status: Status) -> str:
-    """How the pour stands, in a word of ``OUTCOME_WORDS``, or capped (slower than wanted), or nothing special."""
-    return OUTCOME_WORDS.get(status.outcome, "capped" if status.capped else "")
+    """How the pour stands, in a word of ``OUTCOME_WORDS``, or slower than the wanted speed, or nothing special."""
+    return OUTCOME_WORDS.get(status.outcome, SLOWER if status.capped else "")
 
 
 def not_later(events: Iterable[Event], status: Status) -> list[Event]:
@@ -157,7 +158,7 @@ def _angle(status: Status, doubt: str, former: float) -> str:
     else:
         flanks = [values.get(f"angle_of_repose_{side}_deg") for side in ("left", "right")]
         left, right = (math.nan if flank is None else flank.value for flank in flanks)
-        spread = "" if found.spread is None else f" ± {found.spread:.1f}° over flanks"
+        spread = "" if found.spread is None else f", SD over flanks {found.spread:.1f}°"
         words = f"angle of repose{spread} · one view: left {_degrees(left)}, right {_degrees(right)}"
     angle = _degrees(angle_of_repose_deg(status))
     before = f" <span class='former'>before: {former:.1f}°, one pour each</span>" if math.isfinite(former) else ""

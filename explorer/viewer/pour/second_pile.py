@@ -102,4 +102,4 @@ def _angle(status: Status) -> str:
     found = status.observables.get("angle_of_repose_deg")
     if found is None or not math.isfinite(found.value):
         return "–"
-    return f"{found.value:.1f}°" + ("" if found.spread is None else f" ± {found.spread:.1f}°")
+    return f"{found.value:.1f}°" + ("" if found.spread is None else f", SD over flanks {found.spread:.1f}°")

@@ -6,7 +6,8 @@ import { element } from "/shell/element.js";
 const MARKS = { empty: "○", assumed: "◌", measured: "●", running: "◐", done: "✓", failed: "✕" };
 const RECONNECT_MS = 1000;
 const SMALL_WINDOW = 700;  // pixels, as viser's own
-let channel = null;
+const LATEST_MS = 10000;  // until which what stands in a room may still come
+let channel = null, sought = null;
 
 function send(command) {
   if (channel && channel.readyState === WebSocket.OPEN) channel.send(JSON.stringify(command));
@@ -19,14 +20,29 @@ function openRoom(name) {
     one => (one.getAttribute("aria-label") || "").startsWith("Expand panel") && one.textContent.includes(name));
   const open = one => {
     press(one);
-    // In a small window all panels stand below each other; what is opened is drawn a moment later.
-    if (window.innerWidth < SMALL_WINDOW) setTimeout(() => tab()?.scrollIntoView({ block: "start" }), 500);
+    if (window.innerWidth < SMALL_WINDOW) keepOnTop(tab);
   };
   soon(() => tab() || sheet(), found => {
     if (found.getAttribute("role") === "tab") { open(found); return; }
     press(found);
     soon(tab, open);
   });
+}
+
+// In a small window all panels stand below each other, and what stands in a room comes after its tab: it is kept on top
+// until all of it can be there, somebody touches the page, or something else is sought.
+function keepOnTop(find) {
+  sought = find;
+  const end = performance.now() + LATEST_MS;
+  const again = () => {
+    if (sought !== find || performance.now() > end) return;
+    find()?.scrollIntoView({ block: "start" });
+    setTimeout(again, 250);
+  };
+  setTimeout(again, 250);
+}
+for (const touch of ["pointerdown", "wheel", "keydown"]) {
+  document.addEventListener(touch, event => { if (event.isTrusted) sought = null; }, { capture: true, passive: true });
 }
 
 // Does something with what is not there yet, but within seconds.
@@ -39,6 +55,7 @@ function soon(find, act, tries = 20) {
 // A section of the room that was just opened, once it is there: unfolded, and in sight.
 function openSection(name) {
   soon(() => sectionHeads().find(one => one.textContent.trim().startsWith(name)), head => {
+    sought = null;
     if (head.parentElement.getBoundingClientRect().height < 60) head.click();
     head.scrollIntoView({ block: "start" });
   });

@@ -282,7 +282,7 @@ def poured_sign(model: str, mean: float, sd: float, pours: int) -> str:
 
 def angle_line(mean: float, sd: float) -> str:
     """A further line of a sign: mean ± standard deviation [°], as far as they are known."""
-    spread = f" ± {sd:.1f}°" if math.isfinite(sd) else ""
+    spread = f" ± {sd:.1f}° SD" if math.isfinite(sd) else ""
     return f"\n{mean:.1f}°{spread}" if math.isfinite(mean) else ""
 
 

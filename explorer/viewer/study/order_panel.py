@@ -15,7 +15,7 @@ from explorer.viewer.actions import Action, Post
 from explorer.viewer.study.process_view import escaped
 from solver import parameters
 
-TARGET_WORDS = {"mean": "mean", "sd": "SD", "margin": "margin of equivalence"}
+TARGET_WORDS = {"mean": "mean", "sd": "SD", "margin": "counts as met within ±"}
 MEASURED_KEYS = ("mean", "sd", "n")
 """Of a target, what photographs give."""
 COLUMNS = "Low, high and measured value of each factor; the study starts from these ranges."

@@ -152,8 +152,9 @@ def prediction_markdown(targets: Sequence[FittedTarget], natural: list[float]) -
     for target in targets:
         mean, half = prediction(target, natural)
         unit = unit_of_observable(target.observable)
-        text = f"{escaped(observable_label(target.observable))} **{unit.attach(fixed(mean))} ± {fixed(half)}**"
-        text += f" (95 % interval of the mean); target {observed(target.observable, target.target)}."
+        text = f"{escaped(observable_label(target.observable))} **{unit.attach(fixed(mean))}**"
+        text += f", mean 95 % {fixed(mean - half)} … {unit.attach(fixed(mean + half))}"
+        text += f"; target {observed(target.observable, target.target)}."
         if not target.anova.better_than_noise:
             text += " The surface is not better than noise: do not take this for a calibration."
         lines.append(text)

@@ -41,6 +41,7 @@ from solver import Scene, canonical, parameters, with_values
 
 PRESENT = "present or newest study"
 NONE = "(the study cannot be read)"
+FROM_FILE = " From the study's file; photographs can take its place (*Laboratory*)."
 PROFILED = "Move a slider: the charts follow."
 
 
@@ -213,7 +214,7 @@ def profile_text(study: Study, name: str) -> str:
 
 def running_markdown(order: QueuedStudy) -> str:
     """Material, profile and target of the study at work: it may be another one than that on the page."""
-    target = target_markdown(order.study.targets, order.photographed).partition(" From the study's file")[0]
+    target = target_markdown(order.study.targets, order.photographed).replace(FROM_FILE, "")
     return f"**At work:** {escaped(order.study.scene.title)}, profile {escaped(order.profile)}. {target}"
 
 
@@ -225,13 +226,15 @@ def target_markdown(targets: Sequence[Target], photographed: PhotographedTarget 
         return ""
     first, *others = (_target_text(target) for target in targets)
     also = f" Also: {escaped('; '.join(others))}." if others else ""
-    return f"**Target:** {escaped(first)}. From the study's file; photographs can take its place (*Laboratory*).{also}"
+    return f"**Target:** {escaped(first)}.{FROM_FILE}{also}"
 
 
 def _target_text(target: Target) -> str:
-    spread = "" if target.sd is None else f" ± {observed(target.observable, target.sd)} ({target.sd_source})"
-    number = "" if target.n is None else f", n = {target.n}"
-    return f"{observable_label(target.observable)}: {observed(target.observable, target.mean)}{spread}{number}"
+    spread = "" if target.sd is None else f" ± {observed(target.observable, target.sd)} SD"
+    whence = [] if target.sd is None else [target.sd_source]
+    whence += [] if target.n is None else [f"n = {target.n}"]
+    told = f" ({', '.join(whence)})" if whence else ""
+    return f"{observable_label(target.observable)}: {observed(target.observable, target.mean)}{spread}{told}"
 
 
 def set_live(session: Session, values: Mapping[str, float | str]) -> None:

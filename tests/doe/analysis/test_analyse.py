@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from doe.analysis.analyse import ResponseTarget, analyse_design
+from doe.analysis.analyse import analyse_design
 from doe.analysis.contrasts import is_regular
+from doe.analysis.optimum import ResponseTarget
 from doe.designs import box_behnken, factorial, fold_over, plackett_burman
 from doe.errors import StatisticsError
 from tests.doe.analysis.textbook import (

@@ -21,6 +21,12 @@ def runs(seed, noise=0.5):
     return (10 + DESIGN[:, 0] + 2 * DESIGN[:, 1] * DESIGN[:, 2] + noise * random.normal(size=len(DESIGN)))[:, None]
 
 
+def aicc(values, terms):
+    """Of the model of these terms on the runs of `DESIGN`."""
+    fitted = fit_surface(DESIGN, values, REGION, terms)
+    return corrected_aic(fitted.mse * fitted.df_residual, fitted.df_residual, len(DESIGN))
+
+
 def model(terms):
     return second_order_terms(DESIGN)[:, included_terms("ABC", terms)]
 
@@ -32,7 +38,7 @@ def test_aicc_is_that_of_another_program():
         theirs = sm.OLS(values[:, 0], model(terms)).fit()
         n, q = len(values), len(theirs.params) + 1
         expected = -2 * theirs.llf + 2 * q + 2 * q * (q + 1) / (n - q - 1) - n * (1 + np.log(2 * np.pi))
-        assert corrected_aic(fit_surface(DESIGN, values, REGION, terms)) == pytest.approx(expected)
+        assert aicc(values, terms) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("rule", ["aicc", "p"])
@@ -66,11 +72,11 @@ def test_elimination_by_p_is_that_of_statsmodels_step_by_step(seed):
 def test_no_single_term_less_has_a_smaller_aicc(seed):
     values = runs(seed, noise=3)
     found = reduced_model(DESIGN, values, REGION, QUADRATIC, "aicc")
-    assert found.criterion == corrected_aic(fit_surface(DESIGN, values, REGION, found.terms))
+    assert found.criterion == aicc(values, found.terms)
     held = {part for term in found.terms if len(term) > 1 for part in term.removesuffix("^2").split("*")}
     for term in set(found.terms) - held:
         fewer = [one for one in found.terms if one != term]
-        assert not fewer or corrected_aic(fit_surface(DESIGN, values, REGION, fewer)) >= found.criterion
+        assert not fewer or aicc(values, fewer) >= found.criterion
 
 
 def test_blocks_stay_in_the_model_that_is_reduced():

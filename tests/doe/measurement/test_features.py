@@ -12,6 +12,7 @@ from doe.measurement.features import (
     SCALARS,
     SCAN,
     cells_of,
+    coarse_map,
     feature_set,
     features_of_data,
     features_of_record,
@@ -21,9 +22,10 @@ from doe.measurement.features import (
 )
 from doe.measurement.piles import PileSurface
 from doe.measurement.scans import Scan
-from solver import unpacked
+from solver import Spheres, unpacked
 from solver.assets import measurement_folder
 from tests.doe.golden_readings import RAW_POURS
+from tests.doe.measurement.folders import MATERIAL, changed, write
 
 
 @pytest.fixture(scope="module")
@@ -128,3 +130,20 @@ def test_listed_heights_give_the_profile_of_data_and_run(trefoil, pour):
     assert np.isfinite(data[:, len(names.scalars) :]).all()
     run = features_of_record(listed, pour)
     assert len(run) == len(names.names)
+
+
+@pytest.mark.parametrize("diameter", ["6.1e-3", "6.2e-3", "12e-3"])
+def test_pixels_are_whole_cells_whatever_a_body_s_size(diameter, tmp_path):
+    """A third of 6.1 mm/4, three times, is not 6.1 mm/4 to the last bit: the map would end within a pixel."""
+    folder = write(tmp_path, {"material.toml": changed(MATERIAL, "12e-3", diameter)})
+    condition = load_measurement(folder).fit[0]
+    radius = float(diameter) / 2.0
+    bead = PileSurface(Spheres(np.array([[0.0, 0.0, radius]]), np.array([radius]), np.array([0])))
+    seen = coarse_map(bead, condition)
+    thickness = frame_of_scene(condition.scene).thickness
+    assert seen.pixel == pytest.approx(thickness)
+    assert len(seen.height) * thickness == pytest.approx(
+        2.0 * frame_of_scene(condition.scene).half_width, abs=2.0 * thickness
+    )
+    # Half a ball over its plate: 2/3 π r³ and the upright wall π r³ below its widest circle.
+    assert seen.volume(np.inf) == pytest.approx(5.0 / 3.0 * np.pi * radius**3, rel=0.05)

@@ -254,21 +254,99 @@ def test_a_factor_of_two_names_is_analysed_by_its_name(tmp_path, process):
                      result["analysis"]["model"]["surface"]["coefficients"], strict=True))  # fmt: skip
     assert [found[term] for term in ("intercept", "A", "B", "C")] == pytest.approx([10, 2, 0, 3], abs=0.02)
     assert "solvent: −1 is water, +1 is ethanol." in result["analysis"]["notes"]
-    assert "--target: solvent is no number" in refused(explorer("analyse", path, "--target", 12))
+    # With a target there is a setting of the numbers for each name.
+    named = analysed(path, "--target", 12)["analysis"]["named"]
+    for group, offset in zip(named["groups"], (-3, 3), strict=True):
+        assert group["setting"]["reached"] == (abs(12 - 10 - offset) <= 2)
     path.write_text(path.read_text(encoding="utf-8").replace("ethanol,", "Ethanol,", 1), encoding="utf-8")
     assert "column solvent: 'Ethanol'; allowed: water, ethanol" in refused(explorer("analyse", path))
 
 
-def test_a_factor_of_three_names_is_analysed_as_blocks(tmp_path, process):
+def test_a_factor_of_three_names_is_a_term_with_two_degrees_of_freedom_or_blocks(tmp_path, process):
     process.write_text(PROCESS + SOLVENT.replace('"ethanol"', '"ethanol", "oil"'), encoding="utf-8")
     path, said = made(tmp_path, "d-optimal", "--factors", process, "--model", "linear", "--runs", 12)
     assert "not told for a factor of three names" in said
-    fill(path, np.random.default_rng(1).standard_normal(12))
-    message = refused(explorer("analyse", path))
-    assert "solvent has 3 levels that are no numbers; allowed: " in message
-    assert "--only time,temperature --block solvent" in message
+    effect = {"water": 0.0, "ethanol": 2.0, "oil": -2.0}
+    lines = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    noise = 0.1 * np.random.default_rng(1).standard_normal(12)
+    fill(path, [10 + effect[cells[6]] + one for cells, one in zip(lines, noise, strict=True)])
+    named = analysed(path, "--model", "linear", "--target", 12)["analysis"]["named"]
+    assert {row["source"]: row["df"] for row in named["rows"]}["C"] == 2
+    assert [one["effect"] for one in named["means"]] == pytest.approx([0, 2, -2], abs=0.2)
+    assert [group["names"] for group in named["groups"]] == [["water"], ["ethanol"], ["oil"]]
+    said = explorer("analyse", path, "--model", "linear", "--target", 12, "--out", tmp_path / "found").stdout
+    assert "solvent: ethanol" in said
+    assert "Terms that act: C (p < 0.05" in said
+    report = (tmp_path / "found/report.md").read_text(encoding="utf-8")
+    assert "solvent: oil" in report
+    assert (tmp_path / "found/data/anova.csv").read_text(encoding="utf-8").count("\n") == 1 + len(named["rows"])
+    assert "C is a factor of names, which has no square" in refused(explorer("analyse", path, "--terms", "A,C^2"))
     result = analysed(path, "--only", "time,temperature", "--block", "solvent")
     assert set(result["analysis"]["model"]["surface"]["block_names"]) == {"water", "ethanol", "oil"}
+
+
+def test_a_morris_design_tells_elementary_effects(tmp_path, process):
+    """y = 3 u_time² + 2 u_temperature on [0, 1]: the temperature acts linearly, σ = 0; of the time e = 3 (u + u')."""
+    path, said = made(tmp_path, "morris", "--factors", process)
+    assert "morris, 10 trajectories: 30 rows × 1 = 30 runs" in said
+    cells = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    fill(path, [3 * ((float(one[4]) - 80) / 10) ** 2 + 2 * (float(one[5]) - 170) / 10 for one in cells])
+    result = analysed(path)["analysis"]
+    assert result["model"] is None
+    time, temperature = result["elementary"]["effects"]
+    assert (temperature["mu_star"], temperature["sigma"]) == (pytest.approx(2), 0)
+    assert set(np.round(time["effects"], 6)) <= {2.0, 4.0}  # 3 (0 + 2/3), 3 (1/3 + 1)
+    said = explorer("analyse", path, "--out", tmp_path / "found").stdout
+    assert "Elementary effects: by μ* A" in said
+    assert "one step of one factor" in (tmp_path / "found/report.md").read_text(encoding="utf-8")
+    assert analysed(path, "--model", "linear")["analysis"]["model"] is not None
+    order = ("design", "morris", "--factors", process, "--runs", 10, "--out", tmp_path / "x.csv")
+    assert "trajectories of 2 factors have 3 runs; allowed: 9, 12" in refused(explorer(*order))
+
+
+def test_days_drawn_at_random_are_a_variance_component(tmp_path, process):
+    """Three days with every run each: y = 10 + 2 A + day, the days -4, 0 and 4 (variance 16)."""
+    path, _ = made(tmp_path, "factorial", "--factors", process, "--replicates", 3, "--blocks", 3)
+    cells = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    noise = 0.1 * np.random.default_rng(2).standard_normal(len(cells))
+    days = {"1": -4, "2": 0, "3": 4}
+    fill(path, [10 + 2 * (float(one[5]) - 85) / 5 + days[one[4]] + e for one, e in zip(cells, noise, strict=True)])
+    random = analysed(path, "--random", "block")["analysis"]["random"]
+    between, within = random["components"]
+    assert between["variance"] == pytest.approx(16, rel=0.1)
+    assert between["low"] < 16 < between["high"]
+    assert within["variance"] < 0.03
+    assert {one["source"]: one["p"] < 1e-6 for one in random["tests"]}["A"]
+    said = explorer("analyse", path, "--random", "block", "--out", tmp_path / "found").stdout
+    assert "between groups" in said
+    assert "Terms that act: A (p < 0.05" in said
+    assert "Satterthwaite" in (tmp_path / "found/report.md").read_text(encoding="utf-8")
+    assert (tmp_path / "found/data/tests.csv").read_text(encoding="utf-8").startswith("source,df,df_error,f,p")
+
+
+def test_a_process_is_set_beside_the_polynomial_and_answers_the_target(tmp_path, process):
+    """A step that no quadratic follows: tanh(4 A) + B, with A = atanh(0.5)/4 = 0.137 at B = 0 for 0.5."""
+    path, _ = made(tmp_path, "lhs", "--factors", process, "--runs", 40)
+    cells = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    a, b = np.array([[(float(one[4]) - 85) / 5, (float(one[5]) - 175) / 5] for one in cells]).T
+    fill(path, np.tanh(4 * a) + b)
+    found = analysed(path, "--surrogate", "gp", "--target", 0.5)["analysis"]
+    polynomial = found["model"]["anova"]["r_squared_predicted_by_row"]
+    assert found["surrogate"]["r_squared_predicted_by_row"] > max(polynomial, 0.99)
+    assert found["optimum"] is None
+    answer = found["surrogate_target"]
+    nearest = min(np.hypot(x, 0.5 - np.tanh(4 * x)) for x in np.linspace(-1, 1, 20001))
+    assert np.hypot((answer["point"][0] - 85) / 5, (answer["point"][1] - 175) / 5) == pytest.approx(nearest, abs=0.02)
+    said = explorer("analyse", path, "--surrogate", "gp", "--target", 0.5, "--out", tmp_path / "found").stdout
+    assert "Predicts better: the Gaussian process; R² of rows left out" in said
+    assert "Gaussian process" in (tmp_path / "found/report.md").read_text(encoding="utf-8")
+    assert "surrogate" not in analysed(path)["analysis"]
+    process.write_text(PROCESS + SOLVENT, encoding="utf-8")
+    (tmp_path / "named").mkdir()
+    named, _ = made(tmp_path / "named", "factorial", "--factors", process)
+    fill(named, range(8))
+    message = refused(explorer("analyse", named, "--surrogate", "gp"))
+    assert "--surrogate gp: solvent is no number; allowed: factors that are, --only time,temperature" in message
 
 
 @pytest.mark.parametrize(

@@ -178,7 +178,7 @@ def test_the_figure_holds_every_replicate_and_escapes_names(tmp_path):
     path = tmp_path / "curves.html"
     assert explorer("lab", "compression", "compression", "--plot", path).exit_code == 0
     page = path.read_text()
-    assert page.count("<figure ") == 3
+    assert page.count('<figure id="curves-') == 3
     assert page.count("replicate 10:") == 6
     assert "<script src" not in page
 

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,9 @@ from solver.observables.silhouette import largest_part, silhouette
 from solver.pours.record import Spheres
 from tests.explorer.command_line import explorer, refused
 from tests.solver.photograph.rendered import Look, fitted, photograph, save, solid_cover
+from tests.solver.photograph.staged import Stage, staged
+from tests.solver.photograph.test_checkerboard import LOOK
+from tests.solver.photograph.test_checkerboard import board as checkerboard
 
 SMALL = Look(width=500)
 
@@ -158,3 +162,29 @@ def test_a_scan_that_is_no_pile_is_refused(pile, tmp_path):
     np.savez(flat, xyz=np.array([[0.0, 0.0, 1e-3]]), radius=np.array([1e-3]), body=np.array([0]))
     line = refused(explorer("measure", pile, "--from-simulation", flat))
     assert "no view of it has two flanks" in line
+
+
+def test_a_checkerboard_takes_the_lens_out(tmp_path):
+    board = save(tmp_path / "board.png", checkerboard(0.1))
+    bent_pile = save(tmp_path / "pile.png", staged(Stage(30.0, fill=0.8, lens=0.1), replace(LOOK, tilt_deg=3.0)))
+    found = data(explorer("measure", bent_pile, "--checkerboard", board, "--json"))
+    assert found["checkerboard"]["lens_k"] == pytest.approx(0.1, abs=0.003)
+    assert found["checkerboard"]["corners"] == 48
+    for side in ("left", "right"):
+        assert found["pictures"][0]["angles"][side]["value_deg"] == pytest.approx(30.0, abs=0.5)
+    text = explorer("measure", bent_pile, "--checkerboard", board).stdout
+    assert "checkerboard board.png: 48 corners, k = +0." in text
+    assert "bends the base line" not in text
+    alone = data(explorer("measure", bent_pile, "--json"))
+    assert "checkerboard" not in alone
+    assert abs(alone["pictures"][0]["angles"]["left"]["value_deg"] - 30.0) > 0.5
+
+
+def test_no_checkerboard_in_one_line(pile, blank, tmp_path):
+    assert "blank.png: no checkerboard: 0 corners of a grid" in refused(
+        explorer("measure", pile, "--checkerboard", blank)
+    )
+    board = save(tmp_path / "board.png", checkerboard(0.0)[:300])
+    assert "whole pictures of one camera" in refused(explorer("measure", pile, "--checkerboard", board))
+    both = ("--checkerboard", board, "--target", tmp_path / "target")
+    assert "--target" in refused(explorer("measure", pile, *both))

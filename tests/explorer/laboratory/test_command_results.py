@@ -8,11 +8,13 @@ import pytest
 
 from doe.laboratory import TESTS
 from explorer.design.analysis import AnalyseOrder
-from explorer.design.choices import ModelOrder
+from explorer.design.choices import Alpha, ModelOrder
+from explorer.design.filled_sheet import read_sheet
 from explorer.design.run_plan import DesignOrder
 from explorer.errors import CommandError
 from explorer.laboratory.command_results import (
     Ruler,
+    SheetOrder,
     analysis_result,
     audit_result,
     bench_result,
@@ -113,9 +115,27 @@ def test_a_picture_of_nothing_says_so(tmp_path):
 
 def test_a_sheet_is_that_of_the_command(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    answer = sheet_result(DesignOrder("box-behnken", replicates=2), "sunflower_extract", 0.5)
+    asked = SheetOrder("sunflower_extract", 0.5, 1.0, decimal_comma=True)
+    answer = sheet_result(DesignOrder("box-behnken", replicates=2, seed=4, standard_order=True), asked)
     assert told(answer).startswith(answer.text.strip())
+    assert "chance to see 1" in answer.text
     assert (tmp_path / "runs.csv").read_bytes() == answer.files["runs.csv"]
+
+
+def test_a_workbook_is_that_of_the_command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    answer = sheet_result(DesignOrder("box-behnken"), SheetOrder("sunflower_extract", workbook=True))
+    told(answer)
+    (tmp_path / "mine.xlsx").write_bytes(answer.files["runs.xlsx"])
+    mine, theirs = (read_sheet(tmp_path / name) for name in ("mine.xlsx", "runs.xlsx"))
+    assert mine.cells == theirs.cells
+    assert len(mine.cells) == 17
+
+
+@pytest.mark.parametrize("number", [0.0, -1.0, float("inf")])
+def test_a_scatter_that_cannot_be_is_refused(number):
+    with pytest.raises(CommandError, match=r"--effect .* a positive number"):
+        sheet_result(DesignOrder("box-behnken"), SheetOrder("sunflower_extract", effect=number))
 
 
 @pytest.mark.parametrize(
@@ -125,12 +145,15 @@ def test_a_sheet_is_that_of_the_command(tmp_path, monkeypatch):
         (DesignOrder("factorial", generators=("C=AB",)), "--generator C=AB"),
         (DesignOrder("plackett-burman", runs=16, nonregular=True), "--runs 16 --nonregular"),
         (DesignOrder("central-composite", blocks=3), "--blocks 3"),
+        (DesignOrder("central-composite", alpha=Alpha.INSCRIBED, centre=2), "--alpha inscribed"),
+        (DesignOrder("factorial", fraction=1), "--fraction 1"),
+        (DesignOrder("d-optimal", augment=asset_path("runs", "sunflower_extract"), runs=3), "--augment"),
         (DesignOrder("d-optimal", model=ModelOrder.LINEAR, constraints=("A + 60*B <= 90",)), "'A + 60*B <= 90'"),
     ],
 )
 def test_options_of_a_design_are_part_of_its_command_line(order, said, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    answer = sheet_result(order, "sunflower_extract", None)
+    answer = sheet_result(order, SheetOrder("sunflower_extract"))
     assert said in answer.command
     assert told(answer).startswith(answer.text.strip())
     assert (tmp_path / "runs.csv").read_bytes() == answer.files["runs.csv"]

@@ -3,6 +3,7 @@
 The pictures are rendered solids of known angles, so that what has to come out is known beforehand.
 """
 
+import datetime
 import io
 import json
 import math
@@ -254,3 +255,53 @@ def test_a_project_has_a_place_for_its_target(tmp_path):
     new_project(tmp_path / "a" / "lentil")
     studies = [folder / "lentil" / "lentil_study.toml" for folder in (tmp_path, tmp_path / "a")]
     assert len({study_project(str(study)).target for study in studies}) == 2
+
+
+def test_photographs_go_into_a_study_file(piles, tmp_path):
+    """Mean and standard deviation are numpy's of the angles that `measure` reads; the rest of the file stays."""
+    assert explorer("new", "study", "lentil", "--out", tmp_path).exit_code == 0
+    file = tmp_path / "lentil_study.toml"
+    before, study = file.read_text(encoding="utf-8"), load_study(str(file))
+    result = explorer("measure", *piles, "--target", file, "--json")
+    assert result.exit_code == 0, result.output
+    means = [one["angles"]["mean"]["value_deg"] for one in json.loads(result.stdout)["pictures"]]
+    again = load_study(str(file))
+    (target,) = again.targets
+    assert (target.mean, target.sd) == pytest.approx((np.mean(means), np.std(means, ddof=1)), abs=6e-5)
+    assert (target.n, target.sd_source, target.margin) == (3, "measured", study.targets[0].margin)
+    assert replace(again, targets=study.targets) == study
+    (note,) = [line for line in file.read_text(encoding="utf-8").splitlines() if line.startswith("# photographs: ")]
+    assert all(path.name in note for path in piles)
+    assert datetime.date.today().isoformat() in note
+    assert "between the 3 photographs" in note
+    assert "n = 3" in result.stderr
+    comments = [line.partition("#")[2] for line in before.splitlines()]
+    assert comments == [
+        line.partition("#")[2] for line in file.read_text(encoding="utf-8").splitlines() if line != note
+    ]
+
+
+def test_one_photograph_gives_a_study_no_number_of_piles(piles, tmp_path):
+    assert explorer("new", "study", "lentil", "--out", tmp_path).exit_code == 0
+    file = tmp_path / "lentil_study.toml"
+    result = explorer("measure", piles[0], "--target", file)
+    assert result.exit_code == 0, result.output
+    assert "how piles differ among each other is in neither" in result.stdout
+    (target,) = load_study(str(file)).targets
+    assert (target.n, target.sd_source, target.standard_error) == (None, OF_ONE, 0.0)
+
+
+def test_a_study_that_does_not_fit_stays_as_it_was(piles, blank, tmp_path):
+    assert explorer("new", "study", "lentil", "--out", tmp_path).exit_code == 0
+    file = tmp_path / "lentil_study.toml"
+    before = file.read_text(encoding="utf-8")
+    assert "is the same picture as" in refused(explorer("measure", piles[0], piles[0], "--target", file))
+    unread = explorer("measure", piles[0], blank, "--target", file)
+    assert (unread.exit_code, unread.stderr.split(":")[0]) == (1, "blank.png")
+    assert file.read_text(encoding="utf-8") == before
+    assert "no such study" in refused(explorer("measure", piles[0], "--target", tmp_path / "other.toml"))
+    assert "is a material, not a study" in refused(explorer("measure", piles[0], "--target", tmp_path / "lentil.toml"))
+    file.write_text(before.replace('"angle_of_repose_deg"', '"apex_height_m"'), encoding="utf-8")
+    line = refused(explorer("measure", piles[0], "--target", file))
+    assert line == "a photograph gives angle_of_repose_deg, and the study's target is apex_height_m"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["lentil.toml", "lentil_study.toml"]

@@ -2,13 +2,16 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import plotly.graph_objects as go
 import pytest
 
-from doe.designs import box_behnken, central_composite, factorial, latin_hypercube, plackett_burman
+from doe.analysis.surface import Blocks
+from doe.designs import box_behnken, central_composite, factorial, latin_hypercube, morris, plackett_burman
 from explorer.design.analysis import AnalyseOrder, analyse_runs
+from explorer.design.choices import Surrogate
 from explorer.design.factors_file import DesignFactor
 from explorer.design.filled_sheet import Runs
 from explorer.design.result import DesignResult
@@ -45,7 +48,32 @@ def with_gap():
     return runs(factorial(3), values)
 
 
+def names():
+    """A number, three names and two."""
+    levels = np.array([(x, a, b) for x in (-1, 0, 1) for a in (-1, 0, 1) for b in (-1, 1)], dtype=float)
+    sheet = runs(np.vstack([levels, levels]), 9 + np.tile(levels @ [1, 2, 0], 2) + 0.3 * noise(36))
+    own = (sheet.factors[0], *(replace(f, low=-1, high=1, unit="", reference=0) for f in sheet.factors[1:]))
+    return replace(
+        sheet, factors=(own[0], replace(own[1], levels=("a", "b", "c")), replace(own[2], levels=("old", "new")))
+    )
+
+
+def in_groups():
+    """Twelve groups of the runs of `names`, drawn at random."""
+    sheet = names()
+    of_run = (np.arange(36) % 12)[:, None]
+    return replace(sheet, groups=Blocks(tuple(f"day {k}" for k in range(12)), of_run))
+
+
 CASES = {
+    "morris": (runs(morris(6, 4, 1), 9 + morris(6, 4, 1) @ [3, 2, 1, 0, 0, 0] + 0.1 * noise(28), "morris"), None),
+    "process": (runs(box_behnken(3, 5), 9 + box_behnken(3, 5) @ [1, 2, 0] + 0.1 * noise(17)), 10.0),
+    "process out of reach": (runs(factorial(2), 9 + noise((4, 3))), 1e6),
+    "process without a target": (runs(latin_hypercube(5, 12, 1), 9 + noise(12)), None),
+    "random groups": (in_groups(), None),
+    "names": (names(), 9.5),
+    "names without a target": (names(), None),
+    "target out of reach of all names": (names(), 99.0),
     "one factor": (runs(np.array([[-1.0], [-0.5], [0], [0.5], [1], [1]]), 5 + noise(6)), 5.0),
     "two factors": (runs(central_composite(2, 4), 5 + noise(12)), 5.1),
     "three factors": (runs(box_behnken(3, 5), 9 + box_behnken(3, 5) @ [1, 2, 0] + 0.1 * noise(17)), 10.0),
@@ -72,7 +100,8 @@ CASES = {
 @pytest.fixture(scope="module", params=CASES, ids=str)
 def result(request):
     sheet, target = CASES[request.param]
-    return analyse_runs(sheet, AnalyseOrder("runs.csv", "load", target))
+    surrogate = Surrogate.GP if "process" in request.param else None
+    return analyse_runs(sheet, AnalyseOrder("runs.csv", "load", target, surrogate=surrogate))
 
 
 def figures(blocks):
@@ -119,7 +148,8 @@ def test_what_acts_and_where_the_target_lies_are_in_short(result):
     first = sections_of(result)[0]
     assert first.title == "In short"
     facts = dict(next(block for block in first.blocks if hasattr(block, "pairs")).pairs)
-    assert ("Target" in facts) == (result.optimum is not None)
+    of_names = result.analysis.named is not None and result.target is not None
+    assert ("Target" in facts) == (result.optimum is not None or of_names)
     assert ("Equation, coded" in facts) == (result.fitted is not None)
     assert ("Factors that act" in facts) == (result.effects is not None)
 

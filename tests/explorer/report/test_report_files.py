@@ -21,10 +21,10 @@ from explorer.report.design import design_report
 from explorer.report.diagnosis import diagnosis_report
 from explorer.report.folder import MANIFEST, NO_FIGURES, bibtex, write_report
 from explorer.report.html import page
-from explorer.report.methods import SOURCES, cited
 from explorer.report.printed import INCH, WIDTHS, drawn, figure_data, printed
 from explorer.report.project import project_report
 from explorer.report.set_up import material_tables, rig_drawing, set_up_of
+from explorer.report.sources import SOURCES, cited
 from solver import load_material
 from solver.rigs import RIGS
 from solver.scenes.scene import with_rig

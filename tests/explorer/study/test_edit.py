@@ -1,11 +1,12 @@
-"""A study changed on the page: the same study but for what was changed."""
+"""A study changed on the page, or by a measurement: the same study but for what was changed."""
 
 import dataclasses
 
 import pytest
 
 from doe.studies.study import load_study
-from explorer.study.edit import StudyEdits, edited_study, listed_edits
+from explorer.errors import CommandError
+from explorer.study.edit import StudyEdits, edited_study, listed_edits, remeasured
 from solver import asset_path
 from solver.assets import shipped_assets
 from tests.explorer.command_line import explorer
@@ -85,3 +86,48 @@ def test_a_material_beside_the_study_is_still_found_from_elsewhere(tmp_path, mon
     away.write_text(text)
     monkeypatch.chdir(away.parent)
     assert load_study(str(away)).scene == changed.scene
+
+
+@pytest.mark.parametrize("name", shipped_assets("studies"))
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_a_measurement_changes_its_own_lines_alone(name, end, tmp_path):
+    before = asset_path("studies", name).read_text(encoding="utf-8")
+    file = tmp_path / f"{name}.toml"
+    file.write_bytes(before.replace("\n", end).encode())
+    target = load_study(str(file)).targets[0]
+    new = dataclasses.replace(target, mean=25.5, sd=None, n=None, sd_source="read twice")
+    text = remeasured(file, new, "photographs: a.png")
+    old, now = before.splitlines(), text.split(end)[:-1]
+    assert "\n" not in "".join(now)
+    kept = [line for line in now if line in old]
+    gone = [line for line in old if line not in now]
+    assert {line.partition("=")[0].strip() for line in gone} <= {"mean", "sd", "n", "sd_source"}
+    assert kept == [line for line in old if line not in gone]
+    file.write_bytes(text.encode())
+    again = load_study(str(file))
+    assert again.targets[0] == new
+    assert again.targets[1:] == load_study(name).targets[1:]
+    # A second measurement takes the place of the first, its note with it, and keys that were away come back.
+    last = dataclasses.replace(target, mean=24.0, sd=1.0, n=3)
+    file.write_bytes(remeasured(file, last, "photographs: b.png").encode())
+    assert load_study(str(file)).targets[0] == last
+    text = file.read_text(encoding="utf-8")
+    assert "a.png" not in text
+    assert text.count("# photographs: b.png") == 1
+
+
+def test_a_target_that_has_no_lines_is_left_alone(tmp_path):
+    """In one line, or with a header of its own inside a text: whatever a line edit would get wrong is refused."""
+    shipped = asset_path("studies", "sunflower_extract").read_text(encoding="utf-8")
+    head, _, tail = shipped.partition("[[target]]")
+    inline = 'target = [{ observable = "angle_of_repose_deg", mean = 24.68 }]\n'
+    rest = tail[tail.index("[[") :]
+    for text in (
+        inline + head + rest,
+        head.replace("format = 1", 'format = 1\ntitle = """\n[[target]]\n"""', 1) + "[[target]]" + tail,
+    ):
+        file = tmp_path / "own.toml"
+        file.write_text(text, encoding="utf-8")
+        target = load_study(str(file)).targets[0]
+        with pytest.raises(CommandError, match=r"allowed: a .*target.* with a line for each key"):
+            remeasured(file, dataclasses.replace(target, mean=20.0), "photographs: a.png")

@@ -1,29 +1,45 @@
 """The tab "Laboratory": a press shows the answer, uploads are offered and kept, what is wrong is one line."""
 
+import html
 import io
+import re
+import shlex
 import zipfile
 from dataclasses import replace
+from html import unescape
+from types import SimpleNamespace
 
+import numpy as np
+import openpyxl
 import pytest
 from viser import UploadedFile
 
 from doe.designs import DESIGNS
 from doe.laboratory import TESTS
 from doe.laboratory.analysis import template_of
+from doe.measurement import load_measurement
+from explorer.design.run_plan import DesignOrder
+from explorer.files.uploads import kept_measurements
 from explorer.laboratory.command_results import CommandResult, template_file
+from explorer.laboratory.run import LabOrder, run_lab
 from explorer.scene.source import material_source
 from explorer.viewer.actions import Actions
+from explorer.viewer.laboratory.analysis_panel import AnalysisPanel
 from explorer.viewer.laboratory.answer_view import answer_html
 from explorer.viewer.laboratory.audit_panel import AuditPanel
 from explorer.viewer.laboratory.bench_panel import BenchPanel
 from explorer.viewer.laboratory.design_panel import DesignPanel
 from explorer.viewer.laboratory.inputs import positive
 from explorer.viewer.laboratory.laboratory_panel import LaboratoryPanel
+from explorer.viewer.laboratory.measured_data_panel import BALANCES, NOTHING, PHOTOGRAPHS, MeasuredDataPanel
 from explorer.viewer.laboratory.photograph_panel import PhotographPanel
 from explorer.viewer.laboratory.rig_panel import RigPanel
 from explorer.viewer.panel import Now
+from explorer.viewer.study.diagnosis_panel import DiagnosisPanel
 from explorer.viewer.study.reports_panel import NONE, ReportsPanel
 from solver.assets import asset_path
+from tests.explorer.command_line import explorer
+from tests.explorer.measured.test_balance import BEGINS, MASS, steady, write
 from tests.explorer.viewer.page_session import PageSession, event, finished, page_context
 
 
@@ -36,7 +52,9 @@ class Bench:
         page = page_context(server, self.session, self.actions.post, folder)
         self.background = page.bench_work
         self.bench, self.rig, self.photograph = BenchPanel(page), RigPanel(page), PhotographPanel(page)
-        self.design, self.audit, self.reports = DesignPanel(page), AuditPanel(page), ReportsPanel(page)
+        self.design, self.analysis = DesignPanel(page), AnalysisPanel(page)
+        self.audit, self.reports = AuditPanel(page), ReportsPanel(page)
+        self.data = MeasuredDataPanel(page)
         self.page = page
 
     def do(self, act):
@@ -112,19 +130,166 @@ def test_what_cannot_be_kept_is_refused(bench, name, content):
     assert not bench.folder.exists() or not list(bench.folder.iterdir())
 
 
+def choose_design(bench, name):
+    bench.design._kind.value = name
+    event(bench.design._kind, name)
+    assert finished(bench.actions, bench.background) == ""
+
+
 def test_a_design_asks_for_what_it_takes(bench):
-    panel = bench.design
-    fields = {"runs": panel._size, "blocks": panel._blocks, "nonregular": panel._nonregular, "fold": panel._fold}
-    fields |= {"generators": panel._generators, "model": panel._model, "constraints": panel._constraints}
+    labels = {
+        "runs": "Size",
+        "centre": "Centre runs",
+        "fraction": "Fraction P",
+        "generators": "Generators",
+        "nonregular": "Nonregular",
+        "fold": "Fold over",
+        "alpha": "Axial points",
+        "lattice": "Degree of the lattice",
+        "model": "Model",
+        "constraints": "Constraints",
+        "kept": "Finished runs",
+    }
     for name, design in DESIGNS.items():
-        panel._kind.value = name
-        event(panel._kind, name)
+        choose_design(bench, name)
+        shown = shown_labels(bench.design)
+        # All that the command's design takes; levels are those of the file of factors. Blocks go with every design.
+        assert {key for key, label in labels.items() if label in shown} == set(design.options) - {"blocks", "levels"}
+        assert {"Blocks", "Runs of each row", "Seed"} <= shown
+        assert design.doc in unescape(bench.design._for.content)
+    choose_design(bench, "box-behnken")
+    bench.design._numbers["blocks"].value = "2"
+    assert "3 factors; there are none that are orthogonal" in bench.do(bench.design._make)
+
+
+def shown_labels(panel):
+    """Labels of what a panel shows."""
+    handles = [one for one in (*vars(panel).values(), *panel._numbers.values()) if getattr(one, "visible", False)]
+    return {getattr(getattr(one, "_choice", one), "label", "") for one in handles}
+
+
+@pytest.mark.parametrize(
+    ("kind", "entered", "words"),
+    [
+        ("central-composite", {"alpha": "face-centred", "centre": "3"}, "--centre 3 --alpha face-centred"),
+        ("factorial", {"fraction": "1", "seed": "7"}, "--fraction 1 --seed 7"),
+        ("d-optimal", {"runs": "12", "constraints": "shear_modulus + 60*restitution <= 90"}, "'shear_modulus + 60"),
+        ("i-optimal", {"model": "linear", "replicates": "2"}, "--replicates 2 --model linear"),
+        ("box-behnken", {"replicates": "2", "blocks": "2"}, "--replicates 2 --blocks 2"),
+    ],
+)
+def test_what_stands_in_the_form_is_in_the_command_that_repeats_it(bench, kind, entered, words):
+    choose_design(bench, kind)
+    for name, value in entered.items():
+        bench.design._fields.get(name, bench.design._numbers.get(name)).value = value
+    assert bench.do(bench.design._make) == ""
+    assert words in unescape(text_of(bench.design.view))
+
+
+def test_a_form_left_as_it_is_asks_for_what_the_command_does(bench):
+    assert bench.design._order() == DesignOrder("box-behnken")
+    # What was entered for another design is no part of this one.
+    choose_design(bench, "central-composite")
+    bench.design._alpha.value = "inscribed"
+    choose_design(bench, "lhs")
+    assert bench.design._order() == DesignOrder("lhs")
+
+
+@pytest.mark.parametrize(
+    ("entered", "words"),
+    [
+        ({"centre": "-1"}, "Centre runs '-1': allowed is a whole number, 0 … 1000, or nothing"),
+        ({"seed": "1.5"}, "Seed '1.5': allowed is a whole number, 0 and more"),
+        ({"replicates": "many"}, "Runs of each row 'many'"),
+        ({"blocks": "1"}, "2 … 512"),
+    ],
+)
+def test_a_number_that_the_command_refuses_is_refused(bench, entered, words):
+    for name, value in entered.items():
+        bench.design._numbers[name].value = value
+    notice = bench.do(bench.design._make)
+    assert words in notice
+    assert "\n" not in notice
+
+
+def test_runs_are_added_to_a_sheet_that_was_sent(bench):
+    sheet = asset_path("runs", "sunflower_extract").read_bytes()
+    choose_design(bench, "d-optimal")
+    assert bench.do(lambda: bench.design._kept._take("first.csv", sheet)) == ""
+    bench.design._numbers["runs"].value = "3"
+    assert bench.do(bench.design._make) == ""
+    assert "20 rows × 1 = 20 runs" in text_of(bench.design.view)
+    (content,) = bench.design.view._answer.files.values()
+    assert content.decode().count("24.") > 0  # results of the finished runs
+
+
+@pytest.mark.parametrize(
+    ("choice", "name", "head"), [(1, "runs.csv", "\ufeff# design".encode()), (2, "runs.xlsx", b"PK")]
+)
+def test_a_sheet_is_made_for_the_spreadsheet_that_opens_it_and_comes_back_filled(bench, choice, name, head):
+    bench.design._format.value = bench.design._format.options[choice]
+    assert bench.do(bench.design._make) == ""
+    ((taken, content),) = bench.design.view._answer.files.items()
+    assert taken == name
+    assert content.startswith(head)
+    assert bench.do(lambda: bench.analysis._filled._take(name, filled(content, name))) == ""
+    assert bench.do(bench.analysis._analyse) == ""
+    assert re.search(r"total +[\d.]+ +16\b", text_of(bench.analysis.view))  # degrees of freedom of 17 runs
+
+
+def filled(content, name):
+    """A sheet with 24, 25, … for results."""
+    if name.endswith(".csv"):
+        lines = content.decode().splitlines()
+        runs = next(k for k, line in enumerate(lines) if line.startswith("row;")) + 1
+        return "\n".join([*lines[:runs], *(f"{line}{24 + k},5" for k, line in enumerate(lines[runs:]))]).encode()
+    book = openpyxl.load_workbook(io.BytesIO(content))
+    rows = [row for row in book.active.iter_rows() if isinstance(row[0].value, int | float)]
+    for k, row in enumerate(rows):
+        row[-1].value = 24.5 + k
+    sent = io.BytesIO()
+    book.save(sent)
+    return sent.getvalue()
+
+
+def test_the_factors_file_to_edit_is_the_chosen_one(bench):
+    assert bench.design._factors_file() == (
+        "sunflower_extract.toml",
+        asset_path("designs", "sunflower_extract").read_bytes(),
+    )
+
+
+def test_a_mixture_is_asked_for_its_lattice(bench):
+    part = '[[factor]]\nname = "%s"\nlow = 0\nhigh = 100\nunit = "%%"\n'
+    choose_design(bench, "mixture")
+    assert "high less low is not the same" in bench.do(bench.design._make)  # the shipped factors are no parts
+    blend = "".join(part % one for one in ("sand", "clay", "silt"))
+    assert bench.do(lambda: bench.design._factors._take("soil.toml", blend.encode())) == ""
+    bench.design._numbers["lattice"].value = "2"
+    assert bench.do(bench.design._make) == ""
+    assert "--lattice 2" in text_of(bench.design.view)
+
+
+def test_a_bench_test_asks_for_what_it_takes(bench):
+    panel = bench.bench
+    boxes = {"compression": panel._compression, "left_out": panel._left_out, "twin": panel._twin, "bias": panel._bias}
+    takers = {name: set() for name in boxes}
+    for test in TESTS:
+        panel._test.value = test
+        event(panel._test, test)
         finished(bench.actions, bench.background)
-        assert {key for key, field in fields.items() if field.visible} == set(fields) & set(design.options), name
-    panel._kind.value = "box-behnken"
-    event(panel._kind, "box-behnken")
-    panel._blocks.value = 2
-    assert "3 factors; there are none that are orthogonal" in bench.do(panel._make)
+        for name, box in boxes.items():
+            takers[name] |= {test} if box.visible else set()
+    assert takers["compression"] == {"shear"}
+    assert takers["left_out"] == {"composition"}
+    # What the command refuses is not offered.
+    for test in TESTS:
+        for name, option in (("twin", {"simulate": True}), ("bias", {"bias": True})):
+            if test not in takers[name]:
+                with pytest.raises(ValueError, match="allowed"):
+                    run_lab(LabOrder(test, test, **option), lambda _: None)
+    assert len(takers["twin"]) == 6
+    assert len(takers["bias"]) == 5
 
 
 def test_a_photograph_from_the_browser_is_read_and_shown(bench):
@@ -225,15 +390,23 @@ def test_a_length_of_nothing_is_none(entered, length):
 
 def test_a_sheet_is_made_and_a_filled_one_analysed(bench):
     assert bench.do(bench.design._make) == ""
-    assert "explorer design box-behnken" in text_of(bench.design.sheet)
-    bench.design._target.value = "24.68"
-    assert bench.do(bench.design._analyse) == ""
-    assert "--target 24.68" in text_of(bench.design.analysis)
-    assert "Contours" in bench.design.analysis._plots._choice.options
-    bench.design._target.value = "steep"
-    assert "target 'steep'" in bench.do(bench.design._analyse)
-    bench.design._target.value, bench.design._block.value = "", "shift"
-    assert "--block shift: no column of blocks" in bench.do(bench.design._analyse)
+    assert "explorer design box-behnken" in text_of(bench.design.view)
+    panel = bench.analysis
+    panel._target.value, panel._target_error.value = "24.68", "0.2"
+    assert bench.do(panel._analyse) == ""
+    assert "--target 24.68 --target-error 0.2" in text_of(panel.view)
+    assert "Contours" in panel.view._plots._choice.options
+    panel._reduce.value, panel._model.value = "by AICc", "quadratic"
+    assert bench.do(panel._analyse) == ""
+    assert "--model quadratic --reduce aicc" in text_of(panel.view)
+    panel._terms.value = "A, B"
+    assert "stands instead of --model" in bench.do(panel._analyse)
+    panel._terms.value, panel._target.value = "", "steep"
+    assert "target 'steep'" in bench.do(panel._analyse)
+    panel._target.value, panel._target_error.value = "24.68", "-1"
+    assert "allowed: 0 and more" in bench.do(panel._analyse)
+    panel._target.value, panel._target_error.value, panel._block.value = "", "", "shift"
+    assert "--block shift: no column of blocks" in bench.do(panel._analyse)
 
 
 def test_an_audit_of_the_shipped_article_and_of_an_archive(bench):
@@ -278,6 +451,8 @@ def test_a_command_line_is_selected_as_a_whole():
         CommandResult("word " * 30, "explorer audit")
     )
     assert "user-select:all" in html
+    # Columns stay in line, however many there are.
+    assert "pre-wrap; overflow-wrap" not in answer_html(CommandResult("seed  shear_modulus  10" * 9, "explorer lab"))
     rows = (("height", "40.0 mm (95 % 39 … 41 mm)"), ("<b>", "&"))
     html = answer_html(CommandResult("", "explorer measure", tables={"a <b>.png": rows}, note="both > 0"))
     # Lines end between words, and not between a number and its unit.
@@ -302,10 +477,10 @@ def test_another_test_offers_its_own_example(bench):
 def test_reports_of_the_laboratory_and_of_commands_are_in_the_room_of_reports(bench, tmp_path):
     bench.reports.show(Now(bench.session.now))
     assert bench.reports._list.options == (NONE,)
-    bench.design._analyse()
+    bench.analysis._analyse()
     assert finished(bench.actions, bench.background) == ""
     (folder,) = bench.page.project.laboratory.iterdir()
-    assert folder.name in text_of(bench.design.analysis)
+    assert folder.name in text_of(bench.analysis.view)
     bench.reports.show(Now(bench.session.now))
     assert bench.reports._list.options == (folder.name,)
     address = bench.reports._frame.content.split('href="')[1].split('"')[0]
@@ -316,3 +491,58 @@ def test_reports_of_the_laboratory_and_of_commands_are_in_the_room_of_reports(be
     (own / "audit_2" / "report.html").write_text("<p>an audit</p>")
     project = replace(bench.page.project, folder=own)
     assert [one.name for one in project.reports] == ["audit_2", folder.name]
+
+
+def test_measured_data_become_a_choice_of_the_diagnosis(bench, tmp_path):
+    """Angles, then a balance's curves of another set-up: the folder is that of the command line that is shown."""
+    panel, uploads = bench.data, bench.page.uploads
+    panel._set.value, panel._angles.value = "lot_7", "24.1, 25.0, 26.2"
+    panel._changes.value = "rig.outlet_height=60mm"
+    assert bench.do(panel._save) == ""
+    assert kept_measurements(uploads) == {"lot_7": uploads / "lot_7"}
+    (first,) = load_measurement(uploads / "lot_7").fit
+    assert first.offered["angle_of_repose_deg"].values.tolist() == [24.1, 25.0, 26.2]
+    shown = html.unescape(text_of(panel.view))
+    assert "role: A is fitted" in shown
+    assert "In the list of Diagnose: lot_7." in shown
+    assert "lot_7" in DiagnosisPanel._offered(SimpleNamespace(_shipped=(), _uploads=uploads))
+    # The same again by the command line.
+    command = re.search(r"(explorer new measurement .*?)</code>", shown)[1]
+    words = shlex.split(command)[1:]
+    words[words.index("--out") + 1] = str(tmp_path / "again")
+    assert explorer(*words).exit_code == 0
+    again = (tmp_path / "again/lot_7/measurement.toml").read_text(encoding="utf-8")
+    assert again == (uploads / "lot_7/measurement.toml").read_text(encoding="utf-8")
+    panel._condition.value, panel._angles.value, panel._starts.value = "B", "", f"{BEGINS}, {BEGINS}"
+    panel._changes.value = f"rig.mass={MASS}"
+    time = np.arange(0.0, 8.0, 0.05)
+    for k in range(2):
+        content = write(tmp_path / "b.csv", time, steady(time) + 1e-6 * k * time).read_bytes()
+        event(panel.uploads[BALANCES], UploadedFile(f"b{k}.csv", content))
+        finished(bench.actions, bench.background)
+    assert panel._kept.content.count(".csv") == 2
+    assert bench.do(panel._save) == ""
+    measurement = load_measurement(uploads / "lot_7")
+    assert [(one.name, one.role) for one in measurement.conditions] == [("A", "holdout"), ("B", "fit")]
+    assert NOTHING in panel._kept.content
+
+
+def test_measured_data_that_do_not_fit_are_refused_in_one_line(bench):
+    panel, uploads = bench.data, bench.page.uploads
+    assert "nothing was measured: give --photo" in bench.do(panel._save)
+    panel._angles.value = "angles.csv"
+    assert "a file of them goes by the command line" in bench.do(panel._save)
+    panel._angles.value, panel._set.value = "24,25", "../lot"
+    assert "letters, digits" in bench.do(panel._save)
+    panel._set.value, panel._changes.value = "lot", "rig.mass=12g rig.mesh=/etc/passwd"
+    assert "rig.mesh: allowed: the study's own" in bench.do(panel._save)
+    panel._changes.value, panel._lag.value = "", "long"
+    assert "Lag of the balance 'long'" in bench.do(panel._save)
+    event(panel.uploads[PHOTOGRAPHS], UploadedFile("a.jpg", b"no picture"))
+    finished(bench.actions, bench.background)
+    panel._lag.value = ""
+    assert "a-" in bench.do(panel._save)
+    assert "a-" in panel._kept.content
+    bench.do(panel._forget)
+    assert NOTHING in panel._kept.content
+    assert kept_measurements(uploads) == {}

@@ -50,9 +50,9 @@ def told(found, pour=PILE, command=IDLE, changed="", comparison=None):
 
 def test_mean_spread_and_number_of_seeds_are_told():
     values = [18.8 + 6.8 * k for k in (-1.0, 0.0, 1.0)]
-    assert "18.8 ± 6.8° over 3 seeds" in told(population(*values))
+    assert "18.8 ± 6.8° SD (3 seeds)" in told(population(*values))
     # 1/√(2(n − 1)) = 1/2
-    assert "few: the sd itself is ± 50 %" in told(population(*values))
+    assert "so few tell the SD to some 50 % only" in told(population(*values))
     assert "few" not in told(population(*values * 4))
 
 
@@ -74,7 +74,7 @@ def test_the_single_pour_is_named_with_what_is_to_be_known_of_it():
 def test_a_change_that_one_pour_cannot_show_says_what_would():
     found = Comparison(-3.1, 9.6, 1, 20, 12, 4.02)
     assert (
-        "friction 0.5 → 0.4: -3.1 ± 9.6° (95 %) against 20 former: not distinguishable in one pour; "
+        "friction 0.5 → 0.4: -3.1°, 95 % -12.7 … +6.5°, against 20 former: not distinguishable in one pour; "
         "12 pours of each would show 4.0°."
     ) in told(population(), changed="friction 0.5 → 0.4", comparison=found)
     seen = told(population(1.0, 2.0), changed="x", comparison=replace(found, half_width=1.0, pours=2))
@@ -152,9 +152,9 @@ def rest(status: Status, angle: float) -> Status:
 
 
 def test_the_stored_pours_of_the_parameters_in_force_are_shown(table):
-    assert "22.0 ± 2.8° over 2 seeds" in table.look()
+    assert "22.0 ± 2.8° SD (2 seeds)" in table.look()
     table.store.add(stored(SOURCE.scene, 9, 22.0))
-    assert "22.0 ± 2.0° over 3 seeds" in table.look()
+    assert "22.0 ± 2.0° SD (3 seeds)" in table.look()
 
 
 def test_a_change_is_held_against_the_former_parameters(table):
@@ -162,8 +162,8 @@ def test_a_change_is_held_against_the_former_parameters(table):
     table.session.set_parameters({FRICTION: 0.2})
     table.look()
     seen = table.look()
-    assert "13.0 ± 1.0° over 3 seeds" in seen
-    assert "static friction seed–seed 0.57 → 0.2: -9.0 ±" in seen
+    assert "13.0 ± 1.0° SD (3 seeds)" in seen
+    assert "static friction seed–seed 0.57 → 0.2: -9.0°, 95 % " in seen
     assert "in 3 pours" in seen
 
 
@@ -175,7 +175,10 @@ def test_a_single_pour_of_new_parameters_is_held_against_them_too(table):
     seen = table.look()
     assert "one pour tells no scatter" in seen
     # 21 against 22 ± 2.8 over 2: t(0.975, 1) = 12.7
-    assert "-1.0 ± 44.0° (95 %) against 2 former: not distinguishable in one pour; 12 pours of each would show" in seen
+    assert (
+        "-1.0°, 95 % -45.0 … +43.0°, against 2 former: not distinguishable in one pour; 12 pours of each would show"
+        in seen
+    )
 
 
 def test_more_pours_are_asked_for_and_can_be_cancelled(table):

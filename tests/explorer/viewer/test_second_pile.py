@@ -164,7 +164,7 @@ def test_both_results_stand_side_by_side():
     )
     second = replace(first, observables={"angle_of_repose_deg": Value(20.5, "deg")}, outcome=Outcome.JAMMED)
     text = comparison_markdown(first, second)
-    assert "| angle of repose | 24.0° ± 3.0° | 20.5° |" in text
+    assert "| angle of repose | 24.0°, SD over flanks 3.0° | 20.5° |" in text
     assert "| state | at rest: a valid pile | jammed: material stays in the rig |" in text
     assert "**+3.5°**" in text
     assert "Same parameters." in text

@@ -19,7 +19,7 @@ def test_the_profiler_follows_its_sliders_and_sets_the_live_pour(table, result, 
     table.show()
     profiler, plots = table.panel._profiler, table.panel._plots
     found = result["optimum"]["single"]
-    assert f"**{found['predicted']:.2f}° ± " in profiler._words.content
+    assert f"**{found['predicted']:.2f}°**, mean 95 % " in profiler._words.content
     paths = [factor["path"] for factor in result["surface"]["factors"]]
     assert profiler.values() == pytest.approx([result["optimum"]["values"][path] for path in paths], rel=1e-5)
     slider = profiler._sliders[0]

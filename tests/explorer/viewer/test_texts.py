@@ -60,7 +60,7 @@ def test_the_readout_tells_what_the_solver_said():
     for part in ("settling", "1.500 s", "0.34 of 1 wanted", "6.19 µs", "5 of 6", "11.3 of 13.6 g", "2.5 µJ"):
         assert part in text
     assert "23.4°" in text
-    assert "± 3.2°" in text
+    assert "SD over flanks 3.2°" in text
     assert "class='dot'" in text
     assert "class='dot'" not in readout_html(STATUS, by_component=False)
     assert "left 21.0°" in text
@@ -76,7 +76,7 @@ def test_the_time_step_is_told_against_its_limit():
     ("now", "word"),
     [
         ({}, ""),
-        ({"capped": True}, "capped"),
+        ({"capped": True}, "slow"),
         ({"state": SessionState.ENDED, "outcome": Outcome.AT_REST}, "at rest"),
         ({"state": SessionState.ENDED, "outcome": Outcome.JAMMED}, "jammed"),
         ({"state": SessionState.ENDED, "outcome": Outcome.NO_HEAP}, "no heap"),

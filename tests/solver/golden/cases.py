@@ -66,6 +66,7 @@ FEW = {
     "funnel": {"rig.mass": 1.5e-3, "rig.outlet_height": 0.02},
     "mesh_funnel": {"rig.mass": 1.5e-3, "rig.outlet_height": 0.02},
     "lifting_cylinder": {"rig.mass": 1.5e-3, "rig.cylinder_height": 0.05, "rig.lift_speed": 0.1},
+    "lipped_plate": {"rig.mass": 1.5e-3, "rig.cylinder_height": 0.05, "rig.lift_speed": 0.1},
     "draw_down_box": {"rig.mass": 3e-3, "rig.width": 0.12, "rig.depth": 0.04, "rig.shelf_height": 0.03},
     "rotating_drum": {
         "rig.diameter": 0.06,

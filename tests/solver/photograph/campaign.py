@@ -1,11 +1,15 @@
 """A campaign of photographs as people take them: supports, funnels, lenses, cameras above and close by, light, codec.
 
 Every picture draws all of it from a seed, so that one may have a tray, a bent lens and a camera above at once.
-`python -m tests.solver.photograph.campaign FIRST LAST` prints every picture and the table of `docs/laboratory.md`.
+`python -m tests.solver.photograph.campaign FIRST LAST FILE.json` reads those seeds, prints the table of
+`docs/laboratory.md` and keeps a row for every picture in the file; seeds that are there already are not read again, so
+that parts of a set may be read one after another (2 s of one core a picture).
 """
 
+import json
 import sys
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -80,6 +84,27 @@ class Shot:
         """Whether a flank is off by more than ``WRONG`` beyond its interval."""
         return self.read and bool((np.abs(self.errors) - self.half).max() > WRONG)
 
+    @property
+    def row(self) -> dict:
+        """What is kept of it, as JSON types. Errors and half widths [°]: left, right, mean."""
+        stage = self.stage
+        what = {
+            "seed": self.seed,
+            "support": stage.support,
+            "lens": self.lens,
+            "camera": self.camera,
+            "angle_deg": round(float(stage.angle_deg), 2),
+            "above_deg": round(float(stage.above_deg), 2),
+            "k": round(float(stage.lens), 3),
+            "readable": bool(self.readable),
+            "read": self.read,
+            "wrong": self.wrong,
+        }
+        if isinstance(self.found, Refusal):
+            return what | {"reason": str(self.found.reason), "detail": self.found.detail}
+        numbers = {"errors_deg": self.errors, "half_deg": self.half}
+        return what | {name: [round(float(one), 3) for one in of] for name, of in numbers.items()}
+
 
 def any_shot(seed):
     """The stage, the look and what the file says of the lens, drawn from ``seed``."""
@@ -140,27 +165,27 @@ def shot(seed):
     return Shot(seed, stage, look, focal, read_photograph(picture))
 
 
-def summary(shots):
-    """Numbers of pictures, of those that a person could read, that are read, and that are read wrong; largest excess
-    over the interval, and median half width of the flanks' intervals [°]."""
-    readable, read = [one for one in shots if one.readable], [one for one in shots if one.read]
+def summary(rows):
+    """Numbers of pictures, of those that a person could read, that are read, and that are read wrong; root mean square
+    error and median half width of the flanks' intervals [°]."""
+    readable, read = [row for row in rows if row["readable"]], [row for row in rows if row["read"]]
     return {
-        "pictures": len(shots),
+        "pictures": len(rows),
         "readable": len(readable),
-        "of these read": sum(one.read for one in readable),
+        "of these read": sum(row["read"] for row in readable),
         "read": len(read),
-        "wrong": sum(one.wrong for one in shots),
-        "rms": float(np.sqrt(np.mean([one.errors[:2] ** 2 for one in read]))) if read else 0.0,
-        "half width": float(np.median([one.half[:2] for one in read])) if read else 0.0,
+        "wrong": sum(row["wrong"] for row in rows),
+        "rms": float(np.sqrt(np.mean([np.square(row["errors_deg"][:2]) for row in read]))) if read else 0.0,
+        "half width": float(np.median([row["half_deg"][:2] for row in read])) if read else 0.0,
     }
 
 
-def table(shots):
-    """Lines of a Markdown table: each support, lens and camera, and all."""
-    groups = {"all": shots}
-    for key in (lambda one: one.stage.support, lambda one: f"lens: {one.lens}", lambda one: f"camera: {one.camera}"):
-        for name in sorted({key(one) for one in shots}):
-            groups[name] = [one for one in shots if key(one) == name]
+def table(rows):
+    """Lines of a Markdown table: all, and each support, lens and camera."""
+    groups = {"all": rows}
+    for key in ("support", "lens", "camera"):
+        for name in sorted({row[key] for row in rows}):
+            groups[name if key == "support" else f"{key} {name}"] = [row for row in rows if row[key] == name]
     lines = []
     for name, group in groups.items():
         found = summary(group)
@@ -171,23 +196,16 @@ def table(shots):
     return lines
 
 
-def line(one):
-    """A shot in a line."""
-    stage = one.stage
-    what = (
-        f"{one.seed} {stage.support} {stage.angle_deg:.1f}° {one.camera} {stage.above_deg:.1f}° D {stage.distance:.1f} "
-        f"k {stage.lens:+.2f} plate {'none' if one.look.plate is None else round(one.look.plate - one.look.pile)} "
-        f"{'readable' if one.readable else '-'}: "
-    )
-    if isinstance(one.found, Refusal):
-        return f"{what}{one.found.reason}: {one.found.detail}"
-    errors = ", ".join(f"{error:+.2f} ± {half:.2f}" for error, half in zip(one.errors, one.half, strict=True))
-    return f"{what}{errors}{' WRONG' if one.wrong else ''} base {one.found.base.kind}"
+def kept(seeds, path):
+    """The rows of ``seeds``: those that the file ``path`` has, and the others, read now and added to it one by one."""
+    rows = {row["seed"]: row for row in json.loads(path.read_text())} if path.exists() else {}
+    for seed in seeds:
+        if seed not in rows:
+            rows[seed] = shot(seed).row
+            lines = ",\n".join(json.dumps(rows[one], ensure_ascii=False) for one in sorted(rows))
+            path.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+    return [rows[seed] for seed in seeds]
 
 
 if __name__ == "__main__":
-    taken = []
-    for number in range(int(sys.argv[1]), int(sys.argv[2])):
-        taken.append(shot(number))
-        print(line(taken[-1]), flush=True)
-    print("\n".join(table(taken)))
+    print("\n".join(table(kept(range(int(sys.argv[1]), int(sys.argv[2]) + 1), Path(sys.argv[3])))))

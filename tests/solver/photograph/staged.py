@@ -83,7 +83,7 @@ class Camera:
         """Directions, shape (3, …), through places of the picture."""
         seen = np.tensordot(self.turn.T, np.stack([x, y]) / self.half, 1)
         straight = seen
-        for _ in range(12):
+        for _ in range(12 if self.k else 0):
             straight = seen / (1.0 + self.k * (straight**2).sum(axis=0))
         right, down = straight * self.half / self.focal
         return (

@@ -10,7 +10,7 @@ from solver.observables.silhouette import largest_part, silhouette
 from solver.photograph import PhotographedPile, Reason, Refusal, open_picture, read_photograph
 from solver.photograph.lens import bent, straight
 from solver.photograph.picture import FILM_DIAGONAL
-from solver.photograph.support import severed, support_under
+from solver.photograph.support import rimless, severed, support_under
 from tests.solver.photograph.coverage import scanned_spheres
 from tests.solver.photograph.rendered import Look, image_cover, photograph, picture_of, solid_cover
 from tests.solver.photograph.staged import Camera, Stage, seen_deg, staged
@@ -76,6 +76,26 @@ def test_a_funnel_that_comes_from_above_the_picture_is_cut_off():
     pile = read_photograph(picture_of(photograph(cover, Look(width=700))))
     assert isinstance(pile, PhotographedPile)
     assert pile.angles.mean.value_deg == pytest.approx(27.5, abs=SMOOTH)
+
+
+def test_a_ledge_on_one_side_is_never_read_wrong():
+    """A pile at one end of a disc."""
+    found = read_photograph(picture_of(staged(Stage(30.0, "disc", wide=1.4, high=0.17, aside=0.4, fill=0.5), LOOK)))
+    assert isinstance(found, Refusal), found.angles
+    assert found.reason == Reason.BENT_FLANK
+
+
+def test_only_thin_bars_on_both_sides_above_the_foot_are_a_rim():
+    y, x = np.mgrid[0:200, 0:400]
+    pile = (np.abs(x - 200) < y - 80) & (y < 180)
+    rim = pile | ((np.abs(y - 150) < 4) & (np.abs(x - 200) < 150))
+    cut = rimless(rim)
+    assert np.abs(np.flatnonzero(cut.any(axis=0))[[0, -1]] - 200.0).max() <= 100
+    assert rimless(pile) is pile
+    one = pile | ((np.abs(y - 150) < 4) & (x > 200) & (x < 350))
+    assert rimless(one) is one
+    plate = pile | ((y >= 180) & (y < 190))
+    assert rimless(plate) is plate
 
 
 def test_only_a_long_tip_is_severed():

@@ -84,6 +84,7 @@ def test_choosing_a_rig_again_keeps_its_settings():
         ),
         ({"rig": {"name": "lifting_cylinder", "diameter": "7cm"}}, ["insertion.region_radius", "up to 0.035 m"]),
         ({"rig": {"name": "lifting_cylinder", "diameter": "11mm"}}, ["rig.diameter", "0.012 m"]),
+        ({"rig": {"name": "lipped_plate", "lip_diameter": "7cm"}}, ["rig.lip_diameter", "0.07 m", "0.08 m"]),
         ({"rig": {"name": "draw_down_box", "slot_width": "11mm"}}, ["rig.slot_width", "more than 0.012 m"]),
         ({"rig": {"name": "draw_down_box", "slot_width": 0.4}}, ["rig.slot_width", "rig.width", "0.24 m"]),
         (

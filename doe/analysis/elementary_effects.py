@@ -1,0 +1,101 @@
+"""Elementary effects of a Morris design: which of many factors act, and which of them bend or act with others?
+
+Two runs, one after the other, that differ in one factor alone by d of its range give its elementary effect
+e = (change of the response)/d, the response's change from low to high if it went on like that. Over the trajectories:
+mu their mean, mu* the mean of |e| (a factor that acts up here and down there has mu near 0, but not mu*), sigma their
+standard deviation, which is 0 of a factor that acts linearly and alone (and has the noise of the runs in it). Source:
+Morris 1991, Technometrics 33:161, doi 10.1080/00401706.1991.10484804; Campolongo, Cariboni and Saltelli 2007, Environ.
+Model. Softw. 22:1509, doi 10.1016/j.envsoft.2006.10.004.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from doe.analysis.replicates import require_matrix, row_moments
+from doe.errors import StatisticsError
+from doe.record import Record
+
+FloatArray = npt.NDArray[np.float64]
+SAME = 1e-9
+"""Coded levels that differ by less are one."""
+
+
+@dataclass(frozen=True)
+class ElementaryEffect(Record):
+    """Of one factor, from low to high, unit of the response; all NaN without an effect. effects: each of the steps.
+
+    mu_star_half_width: of the 95 % interval of mu*, by t. p: is mu zero, by t; p_holm: for all factors at once.
+    """
+
+    factor: str
+    effects: FloatArray
+    mu: float
+    mu_star: float
+    mu_star_half_width: float
+    sigma: float
+    p: float
+    p_holm: float
+
+
+@dataclass(frozen=True)
+class ElementaryEffects(Record):
+    """Of all factors. steps: pairs of runs that differ in one factor; lost: pairs of which a run is missing."""
+
+    effects: tuple[ElementaryEffect, ...]
+    steps: int
+    lost: int
+
+    @property
+    def ranked(self) -> tuple[ElementaryEffect, ...]:
+        """The largest mu* first."""
+        return tuple(sorted(self.effects, key=lambda one: -one.mu_star if math.isfinite(one.mu_star) else math.inf))
+
+
+def elementary_effects(coded: FloatArray, responses: FloatArray, names: Sequence[str]) -> ElementaryEffects:
+    """Return the effects of rows in the order of their trajectories; a row's replicates count as their mean.
+
+    coded: (rows, k), low = -1, high = +1. responses: (rows, replicates), NaN where a run is missing.
+    Raises StatisticsError where no two neighbours differ in one factor alone.
+    """
+    values = row_moments(require_matrix("responses", responses, rows=len(coded)))[0]
+    moved = np.diff(coded, axis=0)
+    single = np.flatnonzero((np.abs(moved) > SAME).sum(axis=1) == 1)
+    if not len(single):
+        raise StatisticsError("coded: no two rows that follow one another differ in one factor alone; no Morris design")
+    factor = np.abs(moved[single]).argmax(axis=1)
+    change = np.diff(values)[single] / (moved[single, factor] / 2)
+    known = ~np.isnan(change)
+    found = [_effect(name, change[known & (factor == k)]) for k, name in enumerate(names)]
+    return ElementaryEffects(_corrected(found), len(single), int((~known).sum()))
+
+
+def _effect(name: str, effects: FloatArray) -> ElementaryEffect:
+    n = len(effects)
+    if not n:
+        return ElementaryEffect(name, effects, *(math.nan,) * 6)
+    mu, mu_star = float(effects.mean()), float(np.abs(effects).mean())
+    if n < 2:
+        return ElementaryEffect(name, effects, mu, mu_star, *(math.nan,) * 4)
+    dust = 1e-9 * float(np.abs(effects).max())
+    # Effects that are all alike differ by rounding, which is no scatter.
+    sigma, spread = (float(one.std(ddof=1)) if np.ptp(one) > dust else 0.0 for one in (effects, np.abs(effects)))
+    half = float(stats.t.ppf(0.975, n - 1)) * spread / math.sqrt(n)
+    p = 2 * float(stats.t.sf(abs(mu) / (sigma / math.sqrt(n)), n - 1)) if sigma else float(mu == 0)
+    return ElementaryEffect(name, effects, mu, mu_star, half, sigma, p, p)
+
+
+def _corrected(found: Sequence[ElementaryEffect]) -> tuple[ElementaryEffect, ...]:
+    """The same with p by Holm 1979 over all factors that have one."""
+    tested = sorted((k for k, one in enumerate(found) if math.isfinite(one.p)), key=lambda k: found[k].p)
+    corrected, least = [one.p for one in found], 0.0
+    for place, k in enumerate(tested):
+        least = max(least, min(1.0, (len(tested) - place) * found[k].p))
+        corrected[k] = least
+    return tuple(ElementaryEffect(**{**vars(one), "p_holm": p}) for one, p in zip(found, corrected, strict=True))

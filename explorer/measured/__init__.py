@@ -1,0 +1,1 @@
+"""What a laboratory brings, as a folder of measured data (`doe.measurement`): `explorer new measurement`."""

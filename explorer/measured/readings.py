@@ -1,0 +1,292 @@
+"""What a laboratory brings of one condition → rows of its table, and files that the reader of data sets takes itself.
+
+    photographs       angle_of_repose_deg@0, read anew from the pictures whenever the folder is; with a scale the height
+    angles            angle_of_repose_deg; in a drum dynamic_angle_deg, below a draw-down box angle_of_repose_deg@0
+    a balance         discharge_time_s; with the time at which the flow was let go also t10, t50, t90 and the curve
+    scans             height_profile_m in rings of the solver's width, and the surfaces themselves
+    a drum's sheet    dynamic_angle_deg, as `explorer lab drum` reads it: the mean of upper and lower angle
+
+The k-th photograph, angle, balance file, scan and row of a sheet are of pour k.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.laboratory import analyse
+from doe.measurement.photographs import HEIGHT
+from doe.measurement.scans import ARRAYS, POINTS, SURFACES, Scan, ScanSettings, read_scan
+from doe.table_file import read_table
+from explorer.errors import CommandError
+from explorer.measured.balance import MOST_BYTES, BalanceCurve, read_balance
+from explorer.units import fixed
+from solver import Scene, pour_rig, poured_mass, without_holes
+from solver.assets import asset_path
+from solver.observables import observable_names
+from solver.observables.pile import PROFILE_RING
+from solver.observables.surface import radial_profile
+from solver.photograph import Refusal, open_picture, read_photograph
+from solver.rigs.rotating_drum import RotatingDrum
+
+Array = npt.NDArray[np.float64]
+ScanUnit = Literal["m", "cm", "mm", "um"]
+
+ANGLES = ("dynamic_angle_deg", "angle_of_repose_deg", "angle_of_repose_deg@0")
+"""What an angle without a name is, the first one that the rig gives."""
+VIEW, DYNAMIC, FLOWED = "angle_of_repose_deg@0", "dynamic_angle_deg", "discharge_time_s"
+SHARES = {"discharge_t10_s": 0.1, "discharge_t50_s": 0.5, "discharge_t90_s": 0.9}
+PLACES = 21
+"""Times of a discharged mass's curve."""
+SAME = 0.02
+"""By how much the Froude number of a drum's sheet and of the rig may differ."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One number of a condition's table, SI, angles in degrees."""
+
+    replicate: int
+    observable: str
+    value: float
+    x: float | None = None
+
+
+@dataclass(frozen=True)
+class Brought:
+    """Files of one condition, in the order of its pours."""
+
+    photographs: tuple[Path, ...] = ()
+    pixel: float | None = None
+    """Length of a pixel of a photograph [m]."""
+    angles: str | None = None
+    """24.1,25.0,… or FILE.csv, FILE.csv:COLUMN."""
+    balances: tuple[Path, ...] = ()
+    starts: tuple[float, ...] = ()
+    """When the gate opened, without one when the first body entered, on each balance's clock, or one for all [s]."""
+    lag: float | None = None
+    """Of the balance [s]."""
+    scans: tuple[Path, ...] = ()
+    scan_unit: ScanUnit = "m"
+    drum: str | None = None
+    """FILE.csv, FILE.csv:COMPONENT, or the shipped sheet's name."""
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What was read: rows, files to keep beside them, and what to tell whoever brought it."""
+
+    rows: list[Row] = field(default_factory=list)
+    photographs: tuple[Path, ...] = ()
+    scans: tuple[Path, ...] = ()
+    sources: list[str] = field(default_factory=list)
+    """A line on every source, for the head of the table."""
+    told: list[str] = field(default_factory=list)
+
+    def add(self, observable: str, values: Sequence[float]) -> None:
+        """The values of a scalar, one for each pour; those that are not finite were not measured."""
+        self.rows.extend(Row(k, observable, value) for k, value in enumerate(values, start=1) if math.isfinite(value))
+
+
+def read_brought(brought: Brought, scene: Scene) -> Readings:
+    """Everything in ``brought`` of pours in the rig of ``scene``.
+
+    Raises CommandError, MeasurementError or LaboratoryError in one line naming the file, its key and what is allowed.
+    """
+    found = Readings(photographs=brought.photographs, scans=brought.scans)
+    given = observable_names(scene)
+    if brought.pixel is not None and not brought.photographs:
+        raise CommandError("--scale: belongs to --photo")
+    if brought.photographs:
+        _check("--photo", any(name in given for name in ANGLES[1:]), scene)
+        _photographs(brought, found)
+    if brought.angles is not None:
+        name = next((name for name in ANGLES if name in given), "")
+        _check("--angles", bool(name), scene)
+        values = _angles(brought.angles)
+        found.add(name, values)
+        found.sources.append(f"{name}: given as {brought.angles[:80]}")
+        found.told.append(f"{len(values)} angles: mean {_mean_and_sd(values)}, taken for {name}")
+    if brought.balances:
+        _check("--balance", FLOWED in given, scene)
+        _balances(brought, scene, found)
+    elif brought.starts or brought.lag is not None:
+        raise CommandError("--starts, --lag: belong to --balance")
+    if brought.scans:
+        _check("--scan", pour_rig(scene).leaves_heap, scene)
+        _scans(brought, found)
+    if brought.drum is not None:
+        _check("--drum", DYNAMIC in given, scene)
+        _drum(brought.drum, scene, found)
+    if not found.rows:
+        said = "; ".join(found.told) or "give --photo, --angles, --balance, --scan or --drum"
+        raise CommandError(f"nothing was measured: {said}")
+    return found
+
+
+def _check(option: str, gives: bool, scene: Scene) -> None:
+    if not gives:
+        raise CommandError(f"{option}: {scene.rig.name} gives {', '.join(observable_names(scene))}, and not that")
+
+
+def _mean_and_sd(values: Sequence[float]) -> str:
+    spread = f", SD {fixed(float(np.std(values, ddof=1)))}°" if len(values) > 1 else ""
+    return f"{fixed(float(np.mean(values)))}°{spread}"
+
+
+def _photographs(brought: Brought, found: Readings) -> None:
+    """Every picture has to show a pile: one that shows none would be a pour without a number."""
+    seen: dict[bytes, Path] = {}
+    angles, heights = [], []
+    for file in brought.photographs:
+        if (twin := seen.setdefault(file.read_bytes(), file)) is not file:
+            raise CommandError(f"--photo {file}: is the same picture as {twin}; take one of another pour")
+        read = read_photograph(open_picture(file), brought.pixel)
+        if isinstance(read, Refusal):
+            raise CommandError(f"--photo {file}: no angle: {read.reason}: {read.detail}")
+        angles.append(read.angles.mean.value_deg)
+        heights.append(read.height)
+    found.add(VIEW, angles)
+    if brought.pixel is not None:
+        found.add(HEIGHT, heights)
+    found.sources.append(f"{VIEW}: read off images/, anew whenever this folder is")
+    found.told.append(f"{len(angles)} photographs, each of another pour: mean {_mean_and_sd(angles)}")
+
+
+def _angles(text: str) -> list[float]:
+    """``24.1,25.0`` or a column of a file."""
+    if ".csv" not in text and ".xlsx" not in text:
+        try:
+            values = [float(part) for part in text.split(",")]
+        except ValueError:
+            values = [math.nan]
+        return _checked_angles(values, f"--angles {text}")
+    path, column = _named_part(text)
+    table = read_table(path, MOST_BYTES, CommandError, ":{}", comments=True)
+    (line, header), *rows = table.rows or ((1, []),)
+    if not column and len(header) == 1:
+        column = header[0]
+    if header.count(column) != 1:
+        raise CommandError(
+            f"--angles {path}:{line}: column {column or 'not named'}; allowed: FILE.csv:COLUMN, one of "
+            f"{', '.join(header)[:100]}"
+        )
+    place = header.index(column)
+    cells = [cells[place] if place < len(cells) else "" for _, cells in rows]
+    return _checked_angles([table.number(cell) for cell in cells], f"--angles {path}: {column}")
+
+
+def _checked_angles(values: list[float], where: str) -> list[float]:
+    if not values or not all(0.0 < value < 90.0 for value in values):
+        raise CommandError(f"{where}: allowed: angles in degrees, above 0 and below 90, one for each pour")
+    return values
+
+
+def _named_part(text: str) -> tuple[Path, str]:
+    """FILE or FILE:PART."""
+    file, _, part = text.rpartition(":")
+    return (Path(file), part) if file and not Path(text).exists() else (Path(text), "")
+
+
+def _balances(brought: Brought, scene: Scene, found: Readings) -> None:
+    curves = [read_balance(file) for file in brought.balances]
+    poured, lag = poured_mass(scene), brought.lag or 0.0
+    if not 0.0 <= lag < math.inf:
+        raise CommandError(f"--lag {lag:g}: allowed: 0 s or more")
+    for curve in curves:
+        if curve.total > poured and curve.whole(poured) == poured:
+            raise CommandError(
+                f"--balance {curve.name}: {1e3 * curve.total:.4g} g passed, and {1e3 * poured:.4g} g are poured; state "
+                "the mass, such as --set rig.mass=30g"
+            )
+        found.told.append(curve.line(poured, brought.lag))
+        if math.isnan(curve.share_time(0.9, poured)):
+            found.told.append(f"{curve.name}: less than 90 % of it passed, so that it has no t90 and no duration")
+    times = {name: [curve.share_time(share, poured) for curve in curves] for name, share in SHARES.items()}
+    found.add(FLOWED, [b - a for a, b in zip(times["discharge_t10_s"], times["discharge_t90_s"], strict=True)])
+    names = ", ".join(file.name for file in brought.balances)
+    found.sources.append(f"{FLOWED}: t90 - t10 of {names}")
+    if not brought.starts:
+        found.told.append("no --starts: t10, t50, t90 and the curve need the time on the balance's clock of the start")
+        return
+    if len(brought.starts) not in (1, len(curves)):
+        raise CommandError(
+            f"--starts: {len(brought.starts)} times; allowed: one, or {len(curves)}, one per balance file"
+        )
+    starts = brought.starts if len(brought.starts) == len(curves) else brought.starts * len(curves)
+    for curve, start in zip(curves, starts, strict=True):
+        if not curve.time[0] <= start < curve.share_time(0.1, poured):
+            raise CommandError(
+                f"--starts {start:g}: allowed: from {curve.time[0]:g} s, where {curve.name} begins, to "
+                f"{curve.share_time(0.1, poured):.4g} s, where a tenth has passed"
+            )
+    for name, values in times.items():
+        found.add(name, [value - start - lag for value, start in zip(values, starts, strict=True)])
+    found.rows.extend(_curves(curves, starts, lag, poured))
+    found.sources.append(f"times and curve: from {', '.join(f'{start:g}' for start in starts)} s on its clock on")
+    found.sources[-1] += f", less a lag of the balance of {lag:g} s"
+
+
+def _curves(curves: Sequence[BalanceCurve], starts: Sequence[float], lag: float, poured: float) -> Iterator[Row]:
+    """``discharged_mass_kg`` at times that all ``curves`` share, until the slowest has passed."""
+    ends = [float(curve.time[-1]) - start - lag for curve, start in zip(curves, starts, strict=True)]
+    done = [curve.share_time(0.99, curve.total) - start - lag for curve, start in zip(curves, starts, strict=True)]
+    for k, (curve, start) in enumerate(zip(curves, starts, strict=True), start=1):
+        for x in np.linspace(0.0, min(min(ends), 1.1 * max(done)), PLACES):
+            mass = float(np.interp(x + start + lag, curve.time, curve.passed))
+            yield Row(k, "discharged_mass_kg", max(0.0, mass), round(float(x), 6))
+
+
+def _scans(brought: Brought, found: Readings) -> None:
+    known = SURFACES + POINTS + ARRAYS
+    scans: list[Scan] = []
+    for file in brought.scans:
+        if file.suffix.lower() not in known or not file.is_file():
+            raise CommandError(f"--scan {file}: allowed: a file that is there and ends in {', '.join(known)}")
+        scans.append(read_scan(file, ScanSettings(unit=brought.scan_unit)))
+    # A ring is known where every scan reaches around it.
+    reach = min(
+        float(min(scan.points[:, :2].max(axis=0).min(), -scan.points[:, :2].min(axis=0).max())) for scan in scans
+    )
+    rings = int(reach / PROFILE_RING)
+    if rings < 2:
+        raise CommandError(
+            f"--scan: reaches {1e3 * reach:.3g} mm around the pile; allowed: {2e3 * PROFILE_RING:g} mm or more"
+        )
+    for k, (file, scan) in enumerate(zip(brought.scans, scans, strict=True), start=1):
+        surface = without_holes(scan.height_map(PROFILE_RING * rings, scan.grid))
+        middle, height = radial_profile(surface, PROFILE_RING, rings)
+        found.rows.extend(
+            Row(k, "height_profile_m", float(z), float(r)) for r, z in zip(middle.round(6), height, strict=True)
+        )
+        found.told.append(f"{file.name}: a point every {1e3 * scan.grid:.3g} mm, {1e3 * height.max():.4g} mm high")
+    found.sources.append("height_profile_m: rings about the middle of the volume of scans/, bare plate as 0")
+
+
+def _drum(text: str, scene: Scene, found: Readings) -> None:
+    path, component = _named_part(text)
+    result = analyse("drum", asset_path("laboratory", str(path)))
+    of = list(dict.fromkeys(one.of[0] for one in result.derived))
+    component = component or of[0]
+    if component not in of or (len(of) > 1 and component == of[0] and ":" not in text):
+        raise CommandError(f"--drum {text}: holds {', '.join(of)}; allowed: one of them, FILE.csv:COMPONENT")
+    by_name = {one.name: one for one in result.derived if one.of[0] == component}
+    angle = by_name.get("dynamic_angle", by_name["dynamic_angle_upper"])
+    values = [math.degrees(value) for value in angle.values]
+    found.add(DYNAMIC, values)
+    found.sources.append(f"{DYNAMIC}: {angle.formula} of {component} in {path.name}")
+    found.told.append(f"{len(values)} readings of {component}: mean {_mean_and_sd(values)}, {angle.formula}")
+    assert isinstance(scene.rig, RotatingDrum)
+    froude = scene.rig.angular_speed**2 * scene.rig.diameter / (2.0 * 9.81)
+    stated = by_name["froude_number"].summary.mean if "froude_number" in by_name else froude
+    if abs(stated / froude - 1.0) > SAME:
+        raise CommandError(
+            f"--drum {text}: a Froude number of {stated:.3g}, and that of the rig is {froude:.3g}; state the rig, such "
+            "as --set rig.speed_rpm=5 --set rig.diameter=84mm"
+        )

@@ -1,0 +1,77 @@
+"""A design of one's own in headless Chromium: its form, the sheet that is taken along, filled and analysed."""
+
+import pytest
+
+from tests.browser.served import served
+from tests.browser.test_page import BEGUN, PATIENCE, SETTINGS, room
+from tests.browser.test_photographed_target import seen, shot
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture(scope="module")
+def page(browser, tmp_path_factory):
+    """The laboratory with the form of a design."""
+    with served(*SETTINGS, data=tmp_path_factory.mktemp("data"), patience=30) as address:
+        page = browser.new_page(viewport={"width": 1280, "height": 1200})
+        page.set_default_timeout(PATIENCE)
+        page.add_init_script(BEGUN)
+        page.goto(address)
+        room(page, "Laboratory")
+        page.get_by_text("Your own design → runs", exact=True).click()
+        yield page
+        page.close()
+
+
+def choose(page, label, option):
+    page.get_by_label(label, exact=True).filter(visible=True).click()
+    page.get_by_role("option", name=option, exact=True).filter(visible=True).click()
+
+
+def enter(page, label, text):
+    box = page.get_by_label(label, exact=True).filter(visible=True)
+    box.fill(text)
+    box.press("Enter")
+
+
+def press(page, button):
+    page.get_by_role("button", name=button, exact=True).filter(visible=True).first.click()
+
+
+def test_the_form_asks_for_what_the_design_takes(page):
+    upload = page.get_by_role("button", name="Upload: finished runs", exact=True)
+    choose(page, "Design", "factorial")
+    page.get_by_label("Fraction P", exact=True).filter(visible=True).wait_for()
+    upload.wait_for(state="hidden")
+    choose(page, "Design", "d-optimal")
+    upload.wait_for()
+    page.get_by_label("Fraction P", exact=True).wait_for(state="hidden")
+    shot(page, "design_form")
+
+
+def test_a_sheet_is_taken_along_filled_and_analysed(page, tmp_path):
+    choose(page, "Design", "central-composite")
+    enter(page, "Centre runs", "3")
+    choose(page, "Axial points", "face-centred")
+    choose(page, "Sheet as", "CSV with 0,5 and semicolons")
+    press(page, "Make the sheet")
+    seen(page, "explorer design central-composite")
+    seen(page, "--centre 3 --alpha face-centred --decimal-comma")
+    shot(page, "design_sheet")
+    with page.expect_download() as taken:
+        press(page, "Take the files along")
+    lines = taken.value.path().read_text(encoding="utf-8-sig").splitlines()
+    head = next(k for k, line in enumerate(lines) if line.startswith("row;"))
+    runs = lines[head + 1 :]
+    assert len(runs) == 17
+    filled = tmp_path / "filled.csv"
+    filled.write_text("\n".join([*lines[: head + 1], *(f"{line}{24 + k % 5},5" for k, line in enumerate(runs))]))
+    page.get_by_text("Your own design → runs", exact=True).click()
+    page.get_by_text("Filled sheet → model and optimum", exact=True).click()
+    with page.expect_file_chooser() as chooser:
+        press(page, "Upload: sheet")
+    chooser.value.set_files(filled)
+    page.wait_for_function("[...document.querySelectorAll('input')].some(one => /^filled-\\w+\\.csv$/.test(one.value))")
+    press(page, "Analyse")
+    seen(page, "explorer analyse")
+    shot(page, "design_analysis")
