@@ -6,6 +6,7 @@ All of it works on the raw pours; readings go with them. A file is changed in on
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import sqlite3
 from collections import Counter
 from collections.abc import Iterator
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from doe.store import Store, StoredRun, StoreError
-from solver import RawPourError, unpacked
+from solver import RawPourError, packed, unpacked
 
 
 @dataclass(frozen=True)
@@ -85,12 +86,15 @@ def merge(path: Path, other: Path) -> Merged:
                 "physics go together"
             )
         with _attached(db, other), db:
-            odd = db.execute(
-                "SELECT pours.key FROM pours JOIN other.pours AS their ON pours.key = their.key "
-                "WHERE pours.raw != their.raw LIMIT 1"
-            ).fetchone()
-            if odd:
-                raise StoreError(f"{other}: run {odd[0][:12]} is another pour there than in {path}; nothing was merged")
+            both = db.execute(
+                "SELECT pours.key, pours.raw, their.raw FROM pours JOIN other.pours AS their ON pours.key = their.key "
+                "WHERE pours.raw != their.raw"
+            )
+            for key, our_raw, their_raw in both:
+                if bits(our_raw) != bits(their_raw):
+                    raise StoreError(
+                        f"{other}: run {key[:12]} is another pour there than in {path}; nothing was merged"
+                    )
             (total,) = db.execute("SELECT count(*) FROM other.pours").fetchone()
             added = db.execute("INSERT OR IGNORE INTO pours SELECT * FROM other.pours").rowcount
         return Merged(added, total - added)
@@ -108,6 +112,14 @@ def prune(path: Path, study: str) -> int:
             removed = db.execute("DELETE FROM pours WHERE study = ?", (study,)).rowcount
         db.execute("VACUUM")
         return removed
+
+
+def bits(raw: bytes) -> bytes:
+    """A raw pour without the time that it took, which alone differs when it is poured again.
+
+    Raises RawPourError for one that cannot be read.
+    """
+    return packed(dataclasses.replace(unpacked(raw), wall_s=0.0))
 
 
 def _has(db: sqlite3.Connection, path: Path, study: str) -> None:
@@ -139,7 +151,7 @@ def _opened(path: Path, readings_do: bool = False) -> Iterator[tuple[Store, sqli
         try:
             with contextlib.closing(sqlite3.connect(path, timeout=60.0)) as db:
                 yield store, db
-        except sqlite3.Error as error:
+        except (sqlite3.Error, RawPourError) as error:
             raise StoreError(f"{path}: cannot be used as a store of runs ({error})") from None
 
 

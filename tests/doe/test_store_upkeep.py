@@ -8,7 +8,7 @@ import pytest
 
 from doe import store_upkeep
 from doe.store import Store, StoreError
-from solver import PHYSICS
+from solver import PHYSICS, packed, unpacked
 from tests.doe.test_store import RUN
 from tests.explorer.command_line import explorer
 
@@ -84,8 +84,16 @@ def test_two_stores_are_one_and_what_both_have_is_kept_once(tmp_path, ours):
     assert keys(theirs) == ["k1", "k3"]
 
 
+def test_a_pour_that_took_another_time_elsewhere_is_the_same(tmp_path, ours):
+    slower = packed(dataclasses.replace(unpacked(RUN.raw), wall_s=99.0))
+    assert slower != RUN.raw
+    theirs = store_of(tmp_path / "theirs.sqlite", another(raw=slower))
+    assert store_upkeep.merge(ours, theirs) == store_upkeep.Merged(added=0, known=1)
+
+
 def test_the_same_pour_with_other_bits_is_refused_and_nothing_is_added(tmp_path, ours):
-    theirs = store_of(tmp_path / "theirs.sqlite", another(raw=RUN.raw + b" "), another(key="k3"))
+    later = packed(dataclasses.replace(unpacked(RUN.raw), gate_opened=9.0))
+    theirs = store_of(tmp_path / "theirs.sqlite", another(raw=later), another(key="k3"))
     with pytest.raises(StoreError, match="run k1 is another pour there"):
         store_upkeep.merge(ours, theirs)
     assert keys(ours) == ["k1", "k2"]

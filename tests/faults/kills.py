@@ -23,6 +23,8 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from doe.store_upkeep import bits
+
 ROOT = Path(__file__).parents[2]
 OF_THE_RUN = {"timing", "about", "versions", "reused", "wall_s", "seconds"}
 """Keys of a result that tell of the run, not of what it found."""
@@ -92,7 +94,7 @@ def kept(store: Path) -> dict[str, str]:
             raise sqlite3.DatabaseError(verdict)
         if not db.execute("SELECT * FROM sqlite_master WHERE name = 'pours'").fetchone():
             return {}  # killed before it had made the table
-        return {key: hashlib.sha256(raw).hexdigest() for key, raw in db.execute("SELECT key, raw FROM pours")}
+        return {key: hashlib.sha256(bits(raw)).hexdigest() for key, raw in db.execute("SELECT key, raw FROM pours")}
 
 
 def found_in(result: Path) -> str:
