@@ -30,8 +30,8 @@ def test_a_lip_keeps_what_rolls_away_from_a_bare_plate():
     bare = with_settings(BEADS, {"rig.lip_height": "0.1mm"})
     assert isinstance(BEADS.rig, LippedPlate)
     beyond = {}
-    for lipped, record in run_pours([Job(BEADS, 1, tag=1), Job(bare, 1, tag=0)], threads=2):
+    for index, record in run_pours([Job(BEADS, 1), Job(bare, 1)], threads=2):
         distance = np.hypot(*record.bodies.position[:, :2].T)
-        beyond[lipped] = np.mean(distance > 0.5 * BEADS.rig.lip_diameter)
-    assert beyond[1] < 0.05
-    assert beyond[0] > 0.3
+        beyond["bare" if index else "lipped"] = np.mean(distance > 0.5 * BEADS.rig.lip_diameter)
+    assert beyond["lipped"] < 0.05
+    assert beyond["bare"] > 0.3
