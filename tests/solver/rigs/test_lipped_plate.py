@@ -12,15 +12,15 @@ pytestmark = pytest.mark.usefixtures("taichi")
 BEADS = with_settings(
     load_material("glass_beads"),
     {
-        "rig.mass": "5g",
+        "rig.mass": "8g",
         "rig.diameter": "30mm",
         "rig.cylinder_height": "40mm",
-        "rig.lip_diameter": "60mm",
+        "rig.lip_diameter": "46mm",
         "rig.lip_height": "4mm",
         "rig.lift_speed": 0.2,
         "insertion.region_radius": "10mm",
         "insertion.rate": "200g/s",
-        "numerics.max_time": 1.0,
+        "numerics.max_time": 1.4,
     },
 )
 
