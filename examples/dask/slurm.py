@@ -1,0 +1,19 @@
+"""Calibrate on a SLURM cluster: python slurm.py, on a node that may submit jobs and stays while the study runs.
+
+Needs pip install 'repose-explorer[dask]' dask-jobqueue, in an environment that the nodes see under the same path.
+"""
+
+import subprocess
+
+from dask_jobqueue import SLURMCluster
+
+WORKERS = 100
+
+if __name__ == "__main__":
+    # A job is one worker: one pour at a time, in one thread. The first pour of a kind compiles for some seconds.
+    with SLURMCluster(
+        queue="standard", account="my-project", walltime="02:00:00", cores=1, processes=1, memory="2GB"
+    ) as cluster:
+        cluster.scale(WORKERS)
+        command = ["explorer", "calibrate", "--headless", "--profile", "quick", "--out", "results/slurm"]
+        subprocess.run([*command, "--scheduler", cluster.scheduler_address], check=True)
