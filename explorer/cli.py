@@ -55,14 +55,14 @@ class Commands(TyperGroup):
         except KeyboardInterrupt:
             raise typer.Exit(INTERRUPTED) from None
         except Exception as error:
-            line = _line_for_user(error)
+            line = line_for_user(error)
             if line is None:
                 raise
             typer.echo(f"error: {line}", err=True)
             raise typer.Exit(BAD_INPUT) from None
 
 
-def _line_for_user(error: Exception) -> str | None:
+def line_for_user(error: Exception) -> str | None:
     """One line about an error in the input; None for an error of the program, which needs its traceback."""
     if isinstance(error, typer.Exit) or getattr(error, "errno", None) == errno.EPIPE:
         return None

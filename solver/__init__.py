@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from solver.assets import AssetNotFoundError, asset_path
 from solver.effects import EFFECTS, SetUpEffect, Telltale
+from solver.npz import NpzError, npz_arrays
 from solver.observables import OBSERVABLES, Value, observable_names, observables_in, observe
 from solver.observables.free_surface import slope_angle_deg
 from solver.observables.named import Named, all_names, named, observe_named, observe_scan
@@ -137,6 +138,7 @@ __all__ = [
     "Members",
     "Named",
     "Names",
+    "NpzError",
     "Number",
     "NumericsTable",
     "Outcome",
@@ -181,6 +183,7 @@ __all__ = [
     "json_schema",
     "load_material",
     "named",
+    "npz_arrays",
     "observable_names",
     "observables_in",
     "observe",

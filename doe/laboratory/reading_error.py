@@ -55,7 +55,8 @@ def propagated(rows: Sequence[Reading], value: Callable[[Sequence[Reading]], flo
         (k, name.removesuffix(ERROR), half / math.sqrt(3.0))
         for k, row in enumerate(rows)
         for name, half in row.values.items()
-        if name.endswith(ERROR)
+        # An error beside an empty reading is that of no reading.
+        if name.endswith(ERROR) and name.removesuffix(ERROR) in row.values
     ]
     if not declared:
         return math.nan

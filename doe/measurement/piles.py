@@ -5,7 +5,6 @@ xyz (n, 3) [m], radius (n,) [m], body (n,): the member spheres of the bodies on 
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,12 +17,14 @@ from doe.errors import MeasurementError
 from solver import (
     OBSERVABLES,
     HeightMap,
+    NpzError,
     ParameterError,
     Pile,
     Scene,
     Spheres,
     height_map,
     named,
+    npz_arrays,
     observe_scan,
     scanned_pile,
 )
@@ -93,17 +94,10 @@ def pile_surfaces(files: Mapping[int, Path]) -> dict[int, PileSurface]:
 
 def _arrays(path: Path) -> tuple[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]]:
     try:
-        with np.load(path, allow_pickle=False) as arrays:
-            missing = [name for name in ("xyz", "radius", "body") if name not in arrays]
-            if missing:
-                raise MeasurementError(f"{path}: {missing[0]}: missing; allowed: arrays xyz, radius, body")
-            return np.asarray(arrays["xyz"]), np.asarray(arrays["radius"]), np.asarray(arrays["body"])
-    except (OSError, EOFError, zipfile.BadZipFile) as error:
-        raise MeasurementError(f"{path}: cannot be read as .npz: {error}") from None
-    except ValueError as error:
-        if isinstance(error, MeasurementError):
-            raise
-        raise MeasurementError(f"{path}: cannot be read as plain arrays: {error}") from None
+        found = npz_arrays(path, ("xyz", "radius", "body"))
+    except (OSError, NpzError) as error:
+        raise MeasurementError(f"{path}: {error}") from None
+    return found["xyz"], found["radius"], found["body"]
 
 
 def pile_values(

@@ -13,7 +13,6 @@ of the highest point.
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +24,7 @@ from pydantic import ConfigDict
 from scipy.spatial import cKDTree
 
 from doe.errors import MeasurementError
-from solver import TABLE, HeightMap, ParameterError, Quantity, Vector
+from solver import TABLE, HeightMap, ParameterError, Quantity, Vector, npz_arrays
 
 Array = npt.NDArray[np.float64]
 
@@ -287,17 +286,9 @@ def _numeric(row: str) -> bool:
 
 def _of_arrays(path: Path) -> tuple[Array, float]:
     try:
-        with np.load(path, allow_pickle=False) as arrays:
-            missing = [name for name in ("height", "x", "y") if name not in arrays]
-            if missing:
-                raise MeasurementError(f"{missing[0]}: missing; allowed: arrays height, x, y")
-            height, x, y = (np.asarray(arrays[name], dtype=np.float64) for name in ("height", "x", "y"))
-    except (EOFError, zipfile.BadZipFile) as error:
-        raise MeasurementError(f"cannot be read as .npz: {error}") from None
-    except ValueError as error:
-        if isinstance(error, MeasurementError):
-            raise
-        raise MeasurementError(f"cannot be read as plain arrays: {error}") from None
+        height, x, y = (array.astype(np.float64) for array in npz_arrays(path, ("height", "x", "y")).values())
+    except (TypeError, ValueError) as error:
+        raise MeasurementError(str(error)) from None
     if x.ndim != 1 or y.ndim != 1 or height.shape != (x.size, y.size) or min(height.shape) < 2:
         raise MeasurementError(
             f"height, x, y: shapes {height.shape}, {x.shape}, {y.shape}; allowed: (n, m), (n,), (m,)"

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -32,6 +31,7 @@ from doe.measurement.features import feature_set
 from doe.measurement.measurement import Measurement
 from doe.record import plain
 from doe.store import READINGS
+from solver import npz_arrays
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -231,12 +231,12 @@ def save(found: Reference, path: Path) -> None:
 def load(path: Path) -> Reference:
     """Read what :func:`save` wrote; raises StatisticsError for anything else, in one line."""
     try:
-        with np.load(path, allow_pickle=False) as file:
-            head = json.loads(bytes(file["head"]))
-            pours = {
-                kind: tuple(file[f"{k}_{c}"].astype(np.float64) for c in range(conditions))
-                for k, (kind, conditions) in enumerate(head["kinds"].items())
-            }
+        file = npz_arrays(path)
+        head = json.loads(bytes(file["head"]))
+        pours = {
+            kind: tuple(file[f"{k}_{c}"].astype(np.float64) for c in range(conditions))
+            for k, (kind, conditions) in enumerate(head["kinds"].items())
+        }
         levels = tuple(
             Level(
                 Direction(one["direction"]["effect"], one["direction"]["name"], tuple(one["direction"]["full"])),
@@ -255,7 +255,7 @@ def load(path: Path) -> Reference:
             head["rounds"],
             ReferencePours(pours, tuple(head["parameters"])),
         )
-    except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise StatisticsError(f"{path}: not a file of reference pours ({' '.join(str(error).split())[:100]})") from None
 
 

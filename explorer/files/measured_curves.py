@@ -10,8 +10,6 @@ A data set gives silhouettes of scans, height profiles and free surfaces. One fi
 
 from __future__ import annotations
 
-import io
-import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -26,6 +24,7 @@ from doe.measurement.measurement import Condition
 from doe.measurement.piles import pile_files, read_pile
 from doe.table_file import CellTable, csv_table, decoded
 from explorer.errors import CommandError
+from solver import NpzError, npz_arrays
 from solver.assets import measurement_folder
 from solver.observables.repose import AZIMUTHS_DEG, Flanks, outline
 from solver.photograph import PhotographError, Refusal, open_picture, read_photograph
@@ -122,19 +121,12 @@ def _scan(name: str, content: bytes) -> MeasuredCurve:
 def scanned_spheres(content: bytes) -> Spheres:
     """The spheres in an .npz file ``content``, all as one body; CommandError in one line for a bad one."""
     try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            size = sum(member.file_size for member in archive.infolist())
-        if size > MOST_BYTES:
-            raise CommandError(f"{size} bytes unpacked; allowed: up to {MOST_BYTES}")
-        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            centre, radius = (np.asarray(arrays[key], dtype=np.float64) for key in ("xyz", "radius"))
-    except KeyError:
-        raise CommandError("allowed are the arrays xyz and radius; one of them is missing") from None
-    except (OSError, EOFError, zipfile.BadZipFile, NotImplementedError) as error:
-        raise CommandError(f"cannot be read as .npz: {' '.join(str(error).split())[:120]}") from None
-    except ValueError as error:
-        if isinstance(error, CommandError):
-            raise
+        centre, radius = (
+            array.astype(np.float64) for array in npz_arrays(content, ("xyz", "radius"), MOST_BYTES).values()
+        )
+    except NpzError as error:
+        raise CommandError(str(error)) from None
+    except (TypeError, ValueError):
         raise CommandError("cannot be read as plain arrays of numbers") from None
     if radius.ndim != 1 or centre.shape != (len(radius), 3) or not 1 <= len(radius) <= MOST_SPHERES:
         raise CommandError(f"xyz and radius have shapes {centre.shape} and {radius.shape}; allowed: (n, 3) and (n,)")

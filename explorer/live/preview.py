@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from explorer.live.frames import Frame
-from solver import Scene, pour_key
+from solver import Scene, npz_arrays, pour_key
 
 FOLDER = Path(__file__).parents[1] / "previews"
 DIGITS = 16
@@ -62,15 +62,15 @@ def load_preview(scene: Scene, seed: int, folder: Path = FOLDER) -> Preview | No
     path = preview_path(scene, seed, folder)
     if not path.is_file():
         return None
-    with np.load(path) as stored:
-        return Preview(
-            times=stored["times"].astype(np.float64),
-            component=stored["component"].astype(np.int32),
-            inside=stored["inside"],
-            position=stored["position"].astype(np.float32),
-            quaternion=stored["quaternion"].astype(np.float32),
-            scale=stored["scale"].astype(np.float32),
-        )
+    stored = npz_arrays(path)
+    return Preview(
+        times=stored["times"].astype(np.float64),
+        component=stored["component"].astype(np.int32),
+        inside=stored["inside"],
+        position=stored["position"].astype(np.float32),
+        quaternion=stored["quaternion"].astype(np.float32),
+        scale=stored["scale"].astype(np.float32),
+    )
 
 
 def save_preview(preview: Preview, scene: Scene, seed: int, folder: Path = FOLDER) -> Path:

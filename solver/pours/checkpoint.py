@@ -12,7 +12,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +22,7 @@ import numpy as np
 from solver.engine.moving_state import Moving
 from solver.engine.snapshot import TABLES, Arrays
 from solver.engine.world import Batch
+from solver.npz import npz_arrays
 from solver.params import ParameterError
 from solver.pours.parameter_ramp import Ramp
 from solver.pours.pour import Pour
@@ -153,13 +153,12 @@ def checkpoint_bytes(kept: Checkpoint) -> bytes:
 def read_checkpoint(path: Path) -> Checkpoint:
     """A checkpoint from its file; ParameterError naming the file if it is none."""
     try:
-        with np.load(path, allow_pickle=False) as file:
-            world = {name: file[name] for name in file.files if name != HEAD}
-            head = json.loads(bytes(file[HEAD]))
+        world = npz_arrays(path)
+        head = json.loads(bytes(world.pop(HEAD)))
         return Checkpoint(head["seed"], head["fingerprint"], head["decided"], world)
     except FileNotFoundError:
         raise ParameterError(f"{path}: no such file") from None
-    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
+    except (OSError, TypeError, ValueError, KeyError) as error:
         raise ParameterError(f"{path}: not a checkpoint, or a damaged one ({error})") from error
 
 

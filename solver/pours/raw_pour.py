@@ -23,12 +23,12 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from solver.npz import npz_arrays
 from solver.observables.heap import told
 from solver.params import declared
 from solver.pours.record import Bodies, FreeSurface, Outcome, Record, Trace
@@ -103,10 +103,9 @@ def unpacked(raw: bytes) -> Record:
     RawPourError for bytes that are no raw pour, or one of another format or of a rig that is not known.
     """
     try:
-        with np.load(io.BytesIO(raw), allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
+        arrays = npz_arrays(raw)
         head = json.loads(bytes(arrays["head"]))
-    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise RawPourError(f"not a raw pour, or a damaged one ({error})") from None
     if head.get("format") != FORMAT:
         raise RawPourError(f"a raw pour of format {head.get('format')!r}; this program reads {FORMAT}")

@@ -12,7 +12,6 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
-import zipfile
 from collections.abc import Callable
 from dataclasses import astuple, dataclass, replace
 from functools import lru_cache
@@ -23,6 +22,7 @@ import numpy.typing as npt
 import platformdirs
 
 from solver.assets import shipped_fits
+from solver.npz import npz_arrays
 from solver.shapes.clump_error import ClumpFit, extent_errors, measured_fit
 from solver.shapes.solid import ShapeError, Solid, file_stamp, mass_properties, surface_mesh
 from solver.shapes.solid_points import interior_points, surface_points
@@ -200,10 +200,10 @@ def fit_name(solid: Solid, spheres: str) -> str:
 def read_fit(path: Path) -> Fit | None:
     """The fit in a file, or None."""
     try:
-        with np.load(path, allow_pickle=False) as kept:
-            centres, radii = kept["centres"], kept["radii"]
-            share, covered, rms, largest, x, y, z, smallest = (float(number) for number in kept["fit"])
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        kept = npz_arrays(path, ("centres", "radii", "fit"))
+        centres, radii = kept["centres"], kept["radii"]
+        share, covered, rms, largest, x, y, z, smallest = (float(number) for number in kept["fit"])
+    except (OSError, TypeError, ValueError):
         return None
     return centres, radii, ClumpFit(len(radii), share, covered, rms, largest, (x, y, z), smallest)
 

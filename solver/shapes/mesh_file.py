@@ -6,6 +6,7 @@ side; parts that are closed only together (a surface split by its materials) are
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -74,6 +75,8 @@ def _check_size(path: Path) -> None:
 def _parts(file: str) -> list[trimesh.Trimesh]:
     import trimesh
 
+    # It logs, with a traceback, the errors that it then raises.
+    logging.getLogger("trimesh").setLevel(logging.CRITICAL)
     try:
         found = trimesh.load_scene(file, process=False).dump(concatenate=False)
     except Exception as error:  # the readers of a damaged file raise anything from KeyError to struct.error

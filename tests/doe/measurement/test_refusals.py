@@ -126,7 +126,7 @@ def test_a_measurement_without_conditions(tmp_path):
 @pytest.mark.parametrize(
     ("arrays", "words"),
     [
-        ({"radius": None}, "radius: missing; allowed: arrays xyz, radius, body"),
+        ({"radius": None}, "array 'radius' is missing; allowed: xyz, radius, body"),
         ({"radius": np.full(5, 6e-3)}, "shapes (6, 3), (5,), (6,)"),
         ({"xyz": np.full((6, 3), np.nan)}, "not finite"),
         ({"body": np.array([0, 0, 1, 2, 3, 4])}, "2 spheres in body 0; allowed: 1"),

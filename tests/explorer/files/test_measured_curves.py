@@ -46,7 +46,7 @@ def test_the_points_of_an_outline_are_drawn_from_left_to_right():
         ("a.csv", b"a\0", "not a text file"),
         ("a.npz", b"no archive", "cannot be read as .npz"),
         ("a.npz", SCAN.read_bytes()[:-99], "cannot be read as .npz"),
-        ("a.npz", npz(xyz=np.zeros((2, 3))), "xyz and radius"),
+        ("a.npz", npz(xyz=np.zeros((2, 3))), "xyz, radius"),
         ("a.npz", npz(xyz=np.zeros((2, 3)), radius=np.ones(3)), "shapes"),
         ("a.npz", npz(xyz=np.zeros((0, 3)), radius=np.ones(0)), "shapes"),
         ("a.npz", npz(xyz=np.zeros((1, 3)), radius=np.zeros(1)), "not positive"),

@@ -1,0 +1,231 @@
+"""Files that are damaged, foreign or hostile, read by every parser: `make fuzz`.
+
+    python -m tests.faults.fuzz --inputs 500 --seed 1 [--only material]
+
+A shipped file is changed at random (bits and blocks of any file; numbers, names and lines of a text), and read as the
+program would. Good ends are a result, or an error that is one line for the user. A fault is anything else: an exception
+of another kind, a message of several lines, more than ``PATIENCE`` of time, a file that appears outside the folder.
+"""
+
+import argparse
+import contextlib
+import random
+import re
+import resource
+import shutil
+import signal
+import tempfile
+import traceback
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from doe.laboratory import TESTS
+from doe.laboratory.analysis import analyse
+from doe.measurement import load_measurement
+from doe.store import Store
+from doe.studies.study import load_study
+from explorer.audit.read_study import read_study
+from explorer.cli import line_for_user
+from explorer.design.analysis import AnalyseOrder, run_analyse
+from explorer.design.factors_file import read_factors
+from explorer.scene.file import load_scene
+from explorer.shape import mesh_solid
+from solver.assets import asset_path
+from solver.photograph import open_picture, read_photograph
+from solver.pours.raw_pour import unpacked
+from tests.doe.test_store import RUN
+
+ROOT = Path(__file__).parents[2]
+ASSETS = ROOT / "assets"
+_place = tempfile.TemporaryDirectory()
+PATIENCE = 20
+"""[s] in which a file of the size of a shipped one has to be read or refused."""
+MEMORY = 2**31
+"""[bytes] that reading may take beside what the program has taken before."""
+TOKENS = (
+    *("nan", "inf", "-inf", "1e308", "-1", "0", "1e-320", "9" * 400, "0x7f", "1_0", "true", "''", "[]", "{}", "[[]]"),
+    *('"../../../etc/passwd"', '"/dev/zero"', '"\\u0000"', '"a\\nb"', "é", "\u202e", "\ufeff", "\x00", '"""', "#", "="),
+    *("1,5", ";", ",,,,", "\t", "[material]", "[[body]]", "[rig]", "name", "=CMD()"),
+)
+"""What a number, a name or a line of a text is replaced by."""
+
+
+@dataclass(frozen=True)
+class Parser:
+    """``read`` takes a path to a changed copy of one of ``seeds``: a file, or a folder of which one file is changed."""
+
+    seeds: tuple[Path, ...]
+    read: Callable[[Path], object]
+
+
+def _stored(path: Path) -> None:
+    store = Store(path, pouring=False)
+    try:
+        list(store.runs())
+    finally:
+        store.close()
+
+
+@cache
+def _a_store() -> Path:
+    """A store of one pour, which is gone with this process."""
+    path = Path(_place.name, "pours.sqlite")
+    store = Store(path)
+    store.add(RUN)
+    store.close()
+    return path
+
+
+def _lab(test: str) -> Callable[[Path], object]:
+    return lambda path: analyse(test, path)
+
+
+def _files(*patterns: str) -> tuple[Path, ...]:
+    return tuple(sorted(path for pattern in patterns for path in ROOT.glob(pattern)))
+
+
+PARSERS = {
+    "material": Parser(_files("assets/materials/*.toml", "assets/benchmarks/*.toml"), lambda p: load_scene(str(p))),
+    "rig and scene": Parser(_files("assets/scenes/*.toml"), lambda p: load_scene(str(p))),
+    "study": Parser(_files("assets/studies/*.toml", "examples/two_rigs/*.toml"), lambda p: load_study(str(p))),
+    "factors": Parser(_files("assets/designs/*.toml"), read_factors),
+    "sheet of runs": Parser(_files("assets/designs/*.csv"), lambda p: run_analyse(AnalyseOrder(str(p)))),
+    "measurement": Parser(
+        _files("assets/measurements/trefoil_1", "assets/measurements/granudrum_mcc"), load_measurement
+    ),
+    "published study": Parser((ROOT / "assets/source_tables",), read_study),
+    "photograph": Parser(_files("assets/photographs/cone*.jpg"), lambda p: read_photograph(open_picture(p))),
+    "mesh": Parser(_files("assets/meshes/*.stl"), lambda p: mesh_solid(p, "mm", "--unit")),
+    "raw pour": Parser(_files("tests/doe/raw_pours/*.npz"), lambda p: unpacked(p.read_bytes())),
+    "store": Parser((_a_store(),), _stored),
+    **{
+        f"readings of {test}": Parser((asset_path("laboratory", test),), _lab(test))
+        for test in TESTS
+        if (ASSETS / "laboratory" / f"{test}.csv").exists()
+    },
+}
+
+
+def changed(content: bytes, draw: random.Random) -> bytes:
+    """``content`` with one to four changes."""
+    for _ in range(draw.randint(1, 4)):
+        content = draw.choice((_bits, _cut, _block, _token, _token, _token, _line, _line))(content, draw)
+    return content
+
+
+def _bits(content: bytes, draw: random.Random) -> bytes:
+    found = bytearray(content)
+    for _ in range(draw.randint(1, 8)):
+        if found:
+            found[draw.randrange(len(found))] ^= 1 << draw.randrange(8)
+    return bytes(found)
+
+
+def _cut(content: bytes, draw: random.Random) -> bytes:
+    return content[: draw.randint(0, len(content))]
+
+
+def _block(content: bytes, draw: random.Random) -> bytes:
+    """A block taken out, doubled, zeroed or moved."""
+    a, b = sorted(draw.randint(0, len(content)) for _ in range(2))
+    b = min(b, a + 4096)
+    block, place = content[a:b], draw.randint(0, len(content))
+    return draw.choice(
+        (
+            content[:a] + content[b:],
+            content[:place] + block + content[place:],
+            content[:a] + bytes(b - a) + content[b:],
+            content[:a] + draw.randbytes(b - a) + content[b:],
+        )
+    )
+
+
+def _token(content: bytes, draw: random.Random) -> bytes:
+    """A number, a name or a quoted text replaced."""
+    found = list(re.finditer(rb"-?\d+\.?\d*(?:e-?\d+)?|[A-Za-z_]+|\"[^\"\n]*\"", content[:200_000]))
+    if not found:
+        return content
+    one = draw.choice(found)
+    return content[: one.start()] + draw.choice(TOKENS).encode() + content[one.end() :]
+
+
+def _line(content: bytes, draw: random.Random) -> bytes:
+    """A line left out, doubled, moved or made up."""
+    lines = content.split(b"\n")
+    k, place = draw.randrange(len(lines)), draw.randrange(len(lines))
+    line = lines[k]
+    act = draw.choice(("out", "double", "move", "new"))
+    if act in ("out", "move"):
+        del lines[k]
+    lines.insert(place, draw.choice(TOKENS).encode() if act == "new" else line) if act != "out" else None
+    return b"\n".join(lines)
+
+
+@contextlib.contextmanager
+def _in_time() -> Iterator[None]:
+    def over(*_: object) -> None:
+        raise TimeoutError(f"not read or refused within {PATIENCE} s")
+
+    signal.signal(signal.SIGALRM, over)
+    signal.alarm(PATIENCE)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+
+
+def fault_of(parser: Parser, seed: str) -> str | None:
+    """What is wrong with how ``parser`` takes the input that ``seed`` makes; None for nothing."""
+    draw = random.Random(seed)
+    source = draw.choice(parser.seeds)
+    with tempfile.TemporaryDirectory() as place:
+        copy = Path(place, source.name)
+        if source.is_dir():
+            shutil.copytree(source, copy)
+            file = draw.choice(sorted(path for path in copy.rglob("*") if path.is_file() and path.suffix != ".md"))
+        else:
+            file = Path(shutil.copy(source, copy))
+        file.write_bytes(changed(file.read_bytes(), draw))
+        try:
+            with _in_time():
+                parser.read(copy)
+        except Exception as error:
+            line = None if isinstance(error, TimeoutError) else line_for_user(error)
+            if line is None:
+                return f"{source.name}: " + "".join(traceback.format_exception(error)[-3:])
+    return None
+
+
+def main() -> int:
+    """Read so many inputs by each parser; 1 if one of them was taken badly."""
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    asked.add_argument("--inputs", type=int, default=500, help="inputs of each parser")
+    asked.add_argument("--seed", type=int, default=1)
+    asked.add_argument("--only", choices=list(PARSERS))
+    order = asked.parse_args()
+    taken = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    tried, faults = 0, 0
+    for name, parser in PARSERS.items():
+        if order.only not in (None, name):
+            continue
+        for number in range(order.inputs):
+            seed = f"{name} {order.seed} {number}"
+            if (fault := fault_of(parser, seed)) is not None:
+                faults += 1
+                print(f"{seed}: {fault}", flush=True)
+            tried += 1
+        print(f"{name}: {order.inputs} inputs", flush=True)
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 - taken
+    if grown > MEMORY:
+        faults += 1
+        print(f"memory: {grown / 1e9:.1f} GB beside what the program had taken")
+    print(
+        f"{tried} inputs of {len(PARSERS)} parsers, seed {order.seed}: {faults} faults, memory + {grown / 1e6:.0f} MB"
+    )
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
