@@ -189,7 +189,7 @@ class Store:
         """
         with self._told():
             row = self._db.execute(f"SELECT {_COLUMNS} FROM pours WHERE key = ?", (key,)).fetchone()
-        run = _from_row(row) if row else None
+        run = self._from_row(row) if row else None
         if run is None or run.readings == READINGS or not run.raw:
             return run
         record = self._record(run)
@@ -254,13 +254,24 @@ class Store:
         except RawPourError as error:
             raise StoreError(f"{self.path}: run {run.key[:12]}: {error}") from None
 
+    def _from_row(self, row: tuple[Any, ...]) -> StoredRun:
+        values = dict(zip(_NAMES, row, strict=True))
+        try:
+            values["parameters"] = json.loads(values["parameters"])
+            values["observables"] = json.loads(values["observables"])
+        except (TypeError, ValueError):
+            raise StoreError(
+                f"{self.path}: run {str(values['key'])[:12]}: its parameters or readings cannot be read"
+            ) from None
+        return StoredRun(**values)
+
     def runs(self, study: str | None = None) -> Iterator[StoredRun]:
         """All runs, oldest first; of one study if named. Read with the version that they were read with."""
         where, arguments = ("WHERE study = ?", (study,)) if study else ("", ())
         columns = _COLUMNS if self._table == "pours" else _COLUMNS_BEFORE_RAW_POURS
         with self._told():
             rows = self._db.execute(f"SELECT {columns} FROM {self._table} {where} ORDER BY created", arguments)
-            yield from map(_from_row, rows)
+            yield from map(self._from_row, rows)
 
     def close(self) -> None:
         """Close the file."""
@@ -271,13 +282,6 @@ _NAMES = [field.name for field in dataclasses.fields(StoredRun)]
 _COLUMNS = ", ".join(_NAMES)
 _ABSENT = {"physics": "0 AS physics", "readings": "0 AS readings", "raw": "x'' AS raw"}
 _COLUMNS_BEFORE_RAW_POURS = ", ".join(_ABSENT.get(name, name) for name in _NAMES)
-
-
-def _from_row(row: tuple[Any, ...]) -> StoredRun:
-    values = dict(zip(_NAMES, row, strict=True))
-    values["parameters"] = json.loads(values["parameters"])
-    values["observables"] = json.loads(values["observables"])
-    return StoredRun(**values)
 
 
 def write_csv(runs: Iterable[StoredRun], file: IO[str]) -> int:

@@ -60,12 +60,12 @@ def propagated(rows: Sequence[Reading], value: Callable[[Sequence[Reading]], flo
     ]
     if not declared:
         return math.nan
-    here, square = value(rows), 0.0
+    here, parts = value(rows), []
     for k, name, u in declared:
         ends = [value(_shifted(rows, k, name, sign * u)) for sign in (1.0, -1.0)]
         up, down = (end if math.isfinite(end) else here for end in ends)
-        square += ((up - down) * (0.5 if all(map(math.isfinite, ends)) else 1.0)) ** 2
-    return math.sqrt(square)
+        parts.append((up - down) * (0.5 if all(map(math.isfinite, ends)) else 1.0))
+    return math.hypot(*parts)
 
 
 def reading_error(values: Sequence[float], summary: ReplicateSummary) -> ReadingError | None:

@@ -158,6 +158,14 @@ def test_a_file_that_is_no_store_is_one_clear_line(tmp_path):
         Store(wrong)
 
 
+def test_a_run_whose_parameters_are_damaged_is_one_line_with_the_file(store, tmp_path):
+    with closing(sqlite3.connect(tmp_path / "runs.sqlite")) as db, db:
+        db.execute("UPDATE pours SET parameters = 'no JSON'")
+    for read in (lambda: store.find("k1"), lambda: list(store.runs())):
+        with pytest.raises(StoreError, match=r"runs\.sqlite: run k1: its parameters or readings cannot be read"):
+            read()
+
+
 def test_csv_has_a_column_per_parameter_and_observable(tmp_path):
     store = Store(tmp_path / "r")
     store.add(RUN)
