@@ -43,10 +43,22 @@ PARTS = {
     ),
     "validation campaign, small": Part((*SLOW, "tests/doe/validation")),
     "other engines, short": Part((*PYTEST, "-m", "slow or not slow", "tests/peers/test_short_pour.py")),
-    "commands and plug-ins": Part((*SLOW, "tests/explorer/commands/test_limit.py", "tests/test_plugins.py")),
+    "commands and plug-ins": Part(
+        (
+            *SLOW,
+            "tests/explorer/commands/test_limit.py",
+            "tests/explorer/study/test_ci_example.py",
+            "tests/test_plugins.py",
+        )
+    ),
     "page speed": Part((sys.executable, "-m", "tests.browser.page_speed")),
     "documents": Part((*SLOW, "tests/test_readme.py", "-k", "as_they_are_written")),
     "README, whole": Part((*SLOW, "tests/test_readme.py", "-k", "to_their_ends")),
+    "a study killed 20 times": Part((sys.executable, "-m", "tests.faults.kills", "study", "--kills", "20")),
+    "fuzzing": Part((sys.executable, "-m", "tests.faults.fuzz", "--inputs", "100")),
+    "a diagnosis killed 10 times": Part(
+        (sys.executable, "-m", "tests.faults.kills", "diagnosis", "--kills", "10"), nightly=False
+    ),
     "trefoils": Part((*SLOW, "tests/explorer/diagnosis/test_trefoils.py"), nightly=False),
     "other engines, 18 pours each": Part((*SLOW, "-s", "tests/peers/test_same_pile.py"), nightly=False),
     "benchmark": Part(

@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape
 
-from doe.diagnose.candidate_experiments import as_suggested
 from doe.diagnose.next_experiment import SURE
 from doe.diagnose.result import BASE, Suggestion
 from doe.errors import MeasurementError
@@ -74,6 +73,9 @@ def write_next(folder: Path, source: Path, measurement: Measurement, suggestion:
 
     Raises CommandError in one line for a folder that is not empty, and for a change that no condition can state.
     """
+    # It brings the solver's kernels along; whoever only writes a measurement's file needs none.
+    from doe.diagnose.candidate_experiments import as_suggested
+
     if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
         raise CommandError(f"{folder}: is not empty; allowed: a folder that is new or empty")
     table = read_toml(source / FILE)

@@ -141,10 +141,14 @@ def design_methods(result: DesignResult) -> Methods:
         f"{result.response.name.replace('_', ' ')}; {runs.missing} had no result."
     )
     if found.effects is not None:
+        error = found.effects.screening.error_source
         text += (
-            f" Effects were tested against the {found.effects.screening.error_source}, corrected by Holm’s procedure"
-            f"{citations(('holm1979',))}, and held against Lenth’s margin{citations(('lenth1989',))}."
+            f" Effects were tested against the {error}, corrected by Holm’s procedure{citations(('holm1979',))}, and "
+            "held"
+            if error is not None
+            else " No run was left over to estimate the scatter from; effects were held"
         )
+        text += f" against Lenth’s margin{citations(('lenth1989',))}."
     if found.model is not None:
         anova = found.model.anova
         terms = int(found.model.surface.included.sum()) - 1

@@ -97,7 +97,7 @@ def test_report_is_written_complete_and_holds_the_same_numbers(tmp_path):
     out = tmp_path / "report"
     result = explorer("analyse", "sunflower_extract", "--target", 24.68, "--out", out)
     assert result.exit_code == 0, result.output
-    files = {"report.html", "report.md", "result.json"}
+    files = {"report.html", "report.md", "result.json", "references.bib"}
     assert {path.name for path in out.iterdir()} == files | {"data", "figures"}
     markdown = (out / "report.md").read_text(encoding="utf-8")
     for words in ("## Target", "## Model", "## Diagnostics", "## Shape and ridge", "a saddle outside the region"):

@@ -101,7 +101,7 @@ def test_a_twin_is_the_command_with_its_options(monkeypatch):
     assert asked == [words.split()]
     assert (answer.text, answer.command) == ("closes", f"explorer {words}")
     assert answer.plots
-    assert list(answer.files) == ["shear.toml"]
+    assert list(answer.files) == ["shear.toml", "report.html"]
 
 
 def test_the_bias_of_a_formula_is_the_commands():
