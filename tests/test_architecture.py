@@ -392,7 +392,9 @@ def test_a_piece_of_a_neighbour_is_found_and_a_plug_in_is_not():
 def test_text_names_only_files_that_there_are():
     """A document or docstring that names a file of the packages, by its name or its path from any folder."""
     paths = [
-        path.relative_to(ROOT).as_posix() for folder in (*PACKAGES, "tests") for path in (ROOT / folder).rglob("*.py")
+        path.relative_to(ROOT).as_posix()
+        for folder in (*PACKAGES, "tests", "examples")
+        for path in (ROOT / folder).rglob("*.py")
     ]
     ends = {"/".join(parts[k:]) for path in paths for parts in [path.split("/")] for k in range(len(parts))}
     documents = [*ROOT.glob("*.md"), *(path for f in (*PACKAGES, "docs") for path in (ROOT / f).rglob("*.md"))]
