@@ -100,6 +100,12 @@ def merge(path: Path, other: Path) -> Merged:
         return Merged(added, total - added)
 
 
+def count(path: Path, study: str) -> int:
+    """The number of runs of ``study``."""
+    with _opened(path) as (_, db):
+        return int(db.execute("SELECT count(*) FROM pours WHERE study = ?", (study,)).fetchone()[0])
+
+
 def prune(path: Path, study: str) -> int:
     """Remove the runs of ``study`` and give their room back; returns how many. Raises StoreError where there are none.
 

@@ -17,6 +17,10 @@ MOST_BYTES = 2**30
 """[bytes] that the arrays of a file may take when they are unpacked."""
 
 
+ZIP_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError)
+"""What ``zipfile`` raises for an archive that is damaged, encrypted or packed in a way that it does not know."""
+
+
 class NpzError(ValueError):
     """A file that is no archive of plain arrays; the message is one line that does not name the file."""
 
@@ -47,7 +51,7 @@ def npz_arrays(source: Path | bytes, names: Sequence[str] = (), most: int = MOST
         raise
     # What zipfile, zlib and NumPy's reader of headers raise for damaged bytes; a size that nobody has is a MemoryError.
     except (
-        *(zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, ValueError, KeyError, TypeError),
-        *(NotImplementedError, RuntimeError, OverflowError, MemoryError, SyntaxError),
+        *ZIP_DAMAGE,
+        *(struct.error, OSError, ValueError, KeyError, TypeError, OverflowError, MemoryError, SyntaxError),
     ) as error:
         raise NpzError(f"cannot be read as .npz of plain arrays ({' '.join(str(error).split())[:120]})") from None

@@ -76,7 +76,7 @@ def prune(
 
     path = file or default_store()
     if not yes:
-        number = store_upkeep.check(path).runs.get(study, 0)
+        number = store_upkeep.count(path, study)
         typer.echo(f"{path}: {number} runs of {study} would be removed; add --yes")
         return
     before = path.stat().st_size

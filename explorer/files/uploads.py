@@ -27,6 +27,7 @@ from explorer.files.output_file import write_whole, write_whole_bytes
 from explorer.scene.source import SceneSource, material_source
 from explorer.scene.text import material_toml
 from explorer.shape import FIXED_UNIT, MOST_FACES_DRAWN, USUAL_UNIT, mesh_solid
+from solver.npz import ZIP_DAMAGE
 from solver.rigs import MeshFunnel
 from solver.scenes.scene import Scene, check, with_rig, with_values
 from solver.shapes.mesh_file import SUFFIXES
@@ -115,7 +116,7 @@ def _unpack(content: bytes, folder: Path, marker: str) -> None:
                 target.parent.mkdir(parents=True, exist_ok=True)
                 with archive.open(member) as packed, target.open("wb") as file:
                     shutil.copyfileobj(packed, file)
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError) as error:
+    except ZIP_DAMAGE as error:
         raise CommandError(f"cannot be unpacked as .zip: {' '.join(str(error).split())[:120]}") from None
 
 

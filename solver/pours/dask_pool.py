@@ -26,7 +26,8 @@ CONNECTED = 10.0
 """[s] in which a scheduler has to answer."""
 _one_at_a_time = threading.Lock()
 _rooms = Rooms()
-_begun = False
+_made_for: Sequence[Scene] | None = None
+"""The scenes for which a worker has made room: Dask hands the same object to every task of a queue."""
 
 
 class SchedulerError(ValueError):
@@ -80,13 +81,14 @@ class DaskPool:
         from distributed.scheduler import KilledWorker
 
         needed = self._client.scatter(tuple(room), broadcast=True, hash=False)
+        here = Program.here()
         finished = as_completed(loop=self._client.loop)
         asked: dict[Any, Job] = {}
         try:
             while queue or asked:
                 while queue:
                     job = queue.popleft()
-                    future = self._client.submit(_poured, job, needed, Program.here(), pure=False)
+                    future = self._client.submit(_poured, job, needed, here, pure=False)
                     asked[future] = job
                     finished.add(future)
                 future = next(finished)
@@ -119,7 +121,7 @@ def _poured(job: Job, room: Sequence[Scene], asked_by: Program) -> Record:
 
     from solver.pours.run import run_job
 
-    global _begun
+    global _made_for
     if Program.here() != asked_by:
         raise SchedulerError(
             f"worker {get_worker().address}: has {Program.here()}, and pours are asked for by {asked_by}; install the "
@@ -127,6 +129,7 @@ def _poured(job: Job, room: Sequence[Scene], asked_by: Program) -> Record:
         )
     # Taichi is one to a process; a worker of several threads pours no faster than one of a single thread.
     with _one_at_a_time:
-        (_rooms.make if _begun else _rooms.begin)(room)
-        _begun = True
+        if room is not _made_for:
+            (_rooms.begin if _made_for is None else _rooms.make)(room)
+            _made_for = room
         return run_job(_rooms.for_scene(job.scene), job)
