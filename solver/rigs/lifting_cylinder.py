@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 from solver.params import ParameterError, param
 from solver.rigs.feed import RoundFeed
@@ -38,7 +39,7 @@ class LiftingCylinder(PourRig):
     wall: str = "rigid_sieve_plate"
 
     name = "lifting_cylinder"
-    surface_names = ("plate", "cylinder")
+    surface_names: ClassVar[tuple[str, ...]] = ("plate", "cylinder")
     gives = (PILE, DISCHARGE)
     quarter_turns = True
 

@@ -31,7 +31,7 @@ class LippedPlate(LiftingCylinder):
     lip_height: float = param(0.003, unit="m", low=1e-4, high=0.1, doc="Height of the lip above the plate.")
 
     name = "lipped_plate"
-    surface_names = ("plate", "cylinder", "lip")  # type: ignore[assignment]  # one more than the bare plate's
+    surface_names = ("plate", "cylinder", "lip")
 
     def surfaces(self) -> tuple[Surface, ...]:
         """Plate, cylinder and lip."""

@@ -87,6 +87,21 @@ def test_a_bad_archive_is_refused_in_one_line_and_leaves_nothing(content, words,
     assert [path for path in tmp_path.rglob("*") if path.name != "uploads"] == []
 
 
+def test_an_archive_damaged_within_is_refused_as_one(tmp_path):
+    """Its list of members is whole, the packed bytes are not: one bit more of them at a time, to the end of a file."""
+    whole = io.BytesIO()
+    with zipfile.ZipFile(whole, "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr("measurement.toml", "x" * 50 + "yz" * 40)
+    content = bytearray(whole.getvalue())
+    start = 30 + len("measurement.toml")
+    for place in range(start, start + 8):
+        damaged = content.copy()
+        damaged[place] ^= 0xFF
+        with pytest.raises(CommandError, match="cannot be unpacked as .zip"):
+            unpacked_measurement("a.zip", bytes(damaged), tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
 def test_labels_are_parts_of_file_names():
     assert label("../../a b<c>") == "a_b_c"
     assert label("…") == "unnamed"
