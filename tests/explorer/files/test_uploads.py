@@ -97,7 +97,7 @@ def test_an_archive_damaged_within_is_refused_as_one(tmp_path):
     for place in range(start, start + 8):
         damaged = content.copy()
         damaged[place] ^= 0xFF
-        with pytest.raises(CommandError, match="cannot be unpacked as .zip"):
+        with pytest.raises(CommandError, match=r"cannot be unpacked as \.zip"):
             unpacked_measurement("a.zip", bytes(damaged), tmp_path)
     assert not list(tmp_path.iterdir())
 
