@@ -2,10 +2,12 @@
 
     python -m tests.faults.kills study --kills 20 --seed 1
     python -m tests.faults.kills diagnosis --kills 10
+    python -m tests.faults.kills page --kills 10
 
-Each kill is SIGKILL at a random moment: of the command, of one of its workers, or of all at once, as when the power
-fails. After each the store is whole, every pour that was in it is in it with the same bits, and the command is started
-again with ``--resume``. In the end the result equals that of the unbroken run, to the last bit of every number.
+Each kill is SIGKILL at a random moment: of the command, of one of its workers, of the page that has started it
+(`tests.faults.page_host`; the command goes on alone then), or of all at once, as when the power fails. After each the
+store is whole, every pour that was in it is in it with the same bits, and the command or page is started again with
+``--resume``. In the end the result equals that of the unbroken run, to the last bit of every number.
 """
 
 import argparse
@@ -35,15 +37,23 @@ VICTIMS = ("command", "worker", "all")
 
 @dataclass(frozen=True)
 class Order:
-    """A command that leaves ``result`` in the folder it is given."""
+    """A module that leaves ``result`` in the folder it is given, or in one that it makes there."""
 
     arguments: tuple[str, ...]
     result: str
+    victims: tuple[str, ...] = VICTIMS
+
+    def found(self, folder: Path) -> Path:
+        """The result in the output folder of ``folder``. Raises FileNotFoundError where there is none."""
+        for file in (folder / "out").rglob(self.result):
+            return file
+        raise FileNotFoundError(folder / "out" / self.result)
 
 
 ORDERS = {
-    "study": Order(("calibrate", "--headless", "--profile", "quick"), "result.json"),
-    "diagnosis": Order(("diagnose", "trefoil_2", "--budget", "120"), "diagnosis.json"),
+    "study": Order(("explorer", "calibrate", "--headless", "--profile", "quick"), "result.json"),
+    "diagnosis": Order(("explorer", "diagnose", "trefoil_2", "--budget", "120"), "diagnosis.json"),
+    "page": Order(("tests.faults.page_host",), "result.json", ("page", *VICTIMS)),
 }
 
 
@@ -51,7 +61,7 @@ ORDERS = {
 class Campaign:
     """What happened: kills by victim, and faults, which are none where all is well."""
 
-    kills: dict[str, int] = field(default_factory=lambda: dict.fromkeys(VICTIMS, 0))
+    kills: dict[str, int]
     pours: int = 0
     faults: list[str] = field(default_factory=list)
 
@@ -67,21 +77,26 @@ class Campaign:
 def started(order: Order, folder: Path, *options: str) -> subprocess.Popen[bytes]:
     """The command at work in a session of its own, its output behind what is in ``folder/said.txt``."""
     out, store = folder / "out", folder / "pours.sqlite"
-    command = [sys.executable, "-m", "explorer", *order.arguments, "--out", str(out), "--store", str(store), *options]
+    command = [sys.executable, "-m", *order.arguments, "--out", str(out), "--store", str(store), *options]
     with (folder / "said.txt").open("ab") as said:
         return subprocess.Popen(command, cwd=ROOT, stdout=said, stderr=said, start_new_session=True)
 
 
-def children(process: int) -> list[int]:
-    """Processes that ``process`` has started and that run."""
-    found = Path(f"/proc/{process}/task/{process}/children")
-    return [int(child) for child in found.read_text().split()] if found.exists() else []
-
-
-def workers(process: int) -> list[int]:
-    """Those of its children that pour: multiprocessing's resource tracker is none."""
-    lines = {child: Path(f"/proc/{child}/cmdline").read_bytes() for child in children(process)}
-    return [child for child, line in lines.items() if b"spawn_main" in line]
+def at_work(folder: Path) -> dict[str, list[int]]:
+    """Processes that work on ``folder``, by what they are: "page", "command" and "worker" (those that pour)."""
+    found: dict[str, list[int]] = {"page": [], "command": [], "worker": []}
+    for place in Path("/proc").glob("[0-9]*/cmdline"):
+        with contextlib.suppress(OSError):
+            line = place.read_bytes()
+            if str(folder / "out").encode() in line and b"python" in line.split(b"\0")[0]:
+                found["page" if b"page_host" in line else "command"].append(int(place.parent.name))
+    for command in found["command"]:
+        with contextlib.suppress(OSError):
+            for child in Path(f"/proc/{command}/task/{command}/children").read_text().split():
+                # multiprocessing's resource tracker is a child, but none that pours.
+                if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes():
+                    found["worker"].append(int(child))
+    return found
 
 
 def kept(store: Path) -> dict[str, str]:
@@ -108,17 +123,16 @@ def found_in(result: Path) -> str:
     return json.dumps(told(json.loads(result.read_text(encoding="utf-8"))), sort_keys=True, indent=1)
 
 
-def killed(process: subprocess.Popen[bytes], victim: str, draw: random.Random) -> bool:
-    """Kill ``victim``; False where there is none any more."""
-    if process.poll() is not None:
-        return False
+def killed(folder: Path, victim: str, draw: random.Random) -> bool:
+    """Kill ``victim`` of those that work on ``folder``; False where there is none any more."""
+    present = at_work(folder)
     try:
-        if victim == "worker":
-            os.kill(draw.choice(workers(process.pid)), signal.SIGKILL)
-        elif victim == "all":
-            os.killpg(process.pid, signal.SIGKILL)
-        else:
-            process.kill()
+        if victim == "all":
+            groups = {os.getpgid(one) for one in (*present["page"], *present["command"])}
+            for group in groups:
+                os.killpg(group, signal.SIGKILL)
+            return bool(groups)
+        os.kill(draw.choice(present[victim]), signal.SIGKILL)
     except (ProcessLookupError, IndexError):
         return False
     return True
@@ -129,7 +143,7 @@ def unbroken(order: Order, folder: Path) -> Path:
     folder.mkdir()
     if started(order, folder).wait():
         raise RuntimeError((folder / "said.txt").read_text())
-    return folder / "out" / order.result
+    return order.found(folder)
 
 
 def rows(store: Path) -> int:
@@ -145,7 +159,8 @@ def rows(store: Path) -> int:
 def campaign(order: Order, folder: Path, kills: int, draw: random.Random) -> Campaign:
     """Run ``order`` in ``folder`` to its end through ``kills`` kills."""
     folder.mkdir()
-    store, seen, story = folder / "pours.sqlite", dict[str, str](), Campaign()
+    store, seen, story = folder / "pours.sqlite", dict[str, str](), Campaign(dict.fromkeys(order.victims, 0))
+    itself = {"all", order.victims[0]}
 
     def look() -> None:
         now = kept(store)
@@ -154,21 +169,21 @@ def campaign(order: Order, folder: Path, kills: int, draw: random.Random) -> Cam
 
     process = started(order, folder)
     while sum(story.kills.values()) < kills:
-        victim, enough = draw.choice(VICTIMS), rows(store) + draw.randint(0, MOST_POURS)
+        victim, enough = draw.choice(order.victims), rows(store) + draw.randint(0, MOST_POURS)
         while rows(store) < enough and process.poll() is None:
             time.sleep(0.05)
         time.sleep(draw.uniform(0.0, LATEST))
-        if killed(process, victim, draw):
+        if killed(folder, victim, draw):
             story.kills[victim] += 1
             print(f"{sum(story.kills.values())}: {victim}, {len(seen)} pours kept", flush=True)
-        if victim != "worker" and process.poll() is None:
-            process.wait()
+            if victim in itself:
+                process.wait()
         look()
         if process.poll() is None:
             continue
         if process.returncode == 0:
             # Finished before it was killed often enough: the rest of the kills meet a command that only reads.
-            (folder / "out" / order.result).unlink()
+            order.found(folder).unlink()
         elif process.returncode != -signal.SIGKILL:
             story.faults.append(f"the command ended with {process.returncode}")
             break
@@ -192,7 +207,7 @@ def main() -> int:
         story = campaign(order, Path(place, "killed"), asked.kills, draw)
         left_alone = unbroken(order, Path(place, "unbroken"))
         if not story.faults:
-            results = (found_in(path) for path in (left_alone, Path(place, "killed/out", order.result)))
+            results = (found_in(path) for path in (left_alone, order.found(Path(place, "killed"))))
             story.faults += [] if len(set(results)) == 1 else ["the result is another"]
             alike = kept(Path(place, "unbroken/pours.sqlite")) == kept(Path(place, "killed/pours.sqlite"))
             story.faults += [] if alike else ["the pours are others"]
