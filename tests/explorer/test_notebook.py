@@ -38,6 +38,8 @@ from tests.explorer.command_line import explorer as command
 from tests.explorer.report.test_charts_stay_private import ADDRESS
 from tests.explorer.study.test_run import Formula
 
+pytestmark = pytest.mark.usefixtures("unprinted")
+
 ROOT = Path(__file__).parents[2]
 FRICTION = "pair.seed.seed.static_friction"
 SMALL = {"rig.mass": "2 g", "body.spheres": "coarse", "insertion.rate": "50 g/s"}

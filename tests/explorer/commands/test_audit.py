@@ -17,6 +17,8 @@ from tests.doe.audit.made_up import clean_study
 from tests.explorer.audit.audited_folder import write_study
 from tests.explorer.command_line import explorer, refused
 
+pytestmark = pytest.mark.usefixtures("unprinted")
+
 SHIPPED = asset_path("source_tables", "table1_physical").parent
 
 

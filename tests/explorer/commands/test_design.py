@@ -10,6 +10,8 @@ from explorer.design.filled_sheet import read_sheet
 from solver.assets import asset_path
 from tests.explorer.command_line import explorer, refused
 
+pytestmark = pytest.mark.usefixtures("unprinted")
+
 PROCESS = """
 responses = ["yield"]
 [[factor]]

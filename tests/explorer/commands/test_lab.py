@@ -11,6 +11,8 @@ from solver import load_material, value
 from solver.assets import asset_path
 from tests.explorer.command_line import explorer, refused
 
+pytestmark = pytest.mark.usefixtures("unprinted")
+
 
 @pytest.mark.parametrize("test", TESTS)
 def test_every_shipped_example_is_evaluated(test):

@@ -16,6 +16,8 @@ from solver.assets import measurement_folder
 from solver.scenes.scene import value
 from tests.explorer import diagnosed
 
+pytestmark = pytest.mark.usefixtures("unprinted")
+
 
 def volume_under(surface):
     """Volume [m³] between the triangles and the plate."""

@@ -30,6 +30,8 @@ from solver.assets import asset_path, shipped_assets
 from tests.explorer.command_line import explorer
 from tests.solver.photograph.examples import BAR_MM, EXAMPLES, MM_PER_PX
 
+pytestmark = pytest.mark.usefixtures("unprinted")
+
 
 def told(answer, *more):
     """What the terminal says to the answer's own command line."""

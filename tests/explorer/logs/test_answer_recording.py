@@ -30,6 +30,8 @@ from tests.explorer.study.test_run import Formula
 from tests.explorer.viewer.page_session import event, finished, page_context
 from tests.explorer.viewer.test_output import Browser
 
+pytestmark = pytest.mark.usefixtures("unprinted")
+
 SEED = 1
 EFFECT = ("rolling_resistance", (0.2,))
 STUDY = "sunflower_extract"

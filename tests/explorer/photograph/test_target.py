@@ -31,6 +31,8 @@ from explorer.project.project import load_project, new_project, study_project
 from tests.explorer.command_line import explorer, refused
 from tests.solver.photograph.rendered import Look, photograph, save, solid_cover
 
+pytestmark = pytest.mark.usefixtures("unprinted")
+
 ANGLES = (24.0, 27.0, 30.0)
 WIDTH = 700
 MM = 0.5

@@ -20,6 +20,8 @@ from explorer.report.content import Figure, Folded, Table
 from explorer.report.design import design_html, design_markdown
 from explorer.report.design.sections import sections_of
 
+pytestmark = pytest.mark.usefixtures("unprinted")
+
 
 def runs(design, values, design_name=""):
     """A sheet of factors f1, f2, … between 10 and 20 mm."""

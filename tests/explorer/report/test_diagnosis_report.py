@@ -30,6 +30,8 @@ from solver.effects import EFFECTS
 from tests.explorer.diagnosed import CASES, EXPECTED, HOSTILE, NAMES, SEEN_AS, result_of_case, typed
 from tests.explorer.reported_studies import visible
 
+pytestmark = pytest.mark.usefixtures("unprinted")
+
 
 @pytest.fixture(scope="module")
 def results():

@@ -33,6 +33,8 @@ from solver.assets import asset_path
 from solver.photograph import open_picture
 from tests.explorer.command_line import explorer, refused
 
+pytestmark = pytest.mark.usefixtures("unprinted")
+
 AUTHOR, NOTES = "Ada Example", "dry & sieved"
 COMMANDS = {
     "Audit": ("audit",),

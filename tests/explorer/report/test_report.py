@@ -21,6 +21,8 @@ from explorer.units import p_value
 from solver import asset_path
 from tests.explorer.reported_studies import CASES, HOSTILE, result_of_case, table, typed, visible
 
+pytestmark = pytest.mark.usefixtures("unprinted")
+
 
 @pytest.fixture(scope="module")
 def results():

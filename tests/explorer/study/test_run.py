@@ -22,6 +22,8 @@ from tests.explorer import reported_studies
 from tests.explorer.command_line import explorer
 from tests.explorer.viewer.study_panel_at_hand import study_with_own_profiles
 
+pytestmark = pytest.mark.usefixtures("unprinted")
+
 
 class Formula(FormulaRunner):
     """Takes the arguments of a PourRunner and tells its progress in the same way."""

@@ -42,6 +42,8 @@ from tests.explorer.command_line import explorer
 from tests.explorer.measured.test_balance import BEGINS, MASS, steady, write
 from tests.explorer.viewer.page_session import PageSession, event, finished, page_context
 
+pytestmark = pytest.mark.usefixtures("unprinted")
+
 
 class Bench:
     """Panels over one background, as in the tab."""

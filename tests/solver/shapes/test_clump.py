@@ -200,7 +200,7 @@ def test_bent_mesh_keeps_its_spheres_inside(tmp_path: Path):
     mesh = trimesh.Trimesh(np.concatenate([bottom, top]), faces)
     assert mesh.volume == pytest.approx(sum(bar.volume for bar in bars))
     mesh.export(tmp_path / "angle.stl")
-    fit = fit_clump(Solid("mesh", file=str(tmp_path / "angle.stl")), 346.0, "standard").fit
+    fit = fit_clump(Solid("mesh", file=str(tmp_path / "angle.stl")), 346.0, "12").fit
     # spheres that touch the inner corner from outside would put a sixth of the union there
     assert fit.covered_ratio >= 0.88 * fit.volume_ratio
     assert fit.covered_ratio >= 0.6
