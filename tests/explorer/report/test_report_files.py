@@ -16,7 +16,7 @@ from doe.provenance import About
 from explorer.design.analysis import AnalyseOrder, run_analyse
 from explorer.errors import CommandError
 from explorer.report import folder, study_report
-from explorer.report.content import DataTable, Drawing, Figure, Strong, Struck, Table, Word
+from explorer.report.content import Caution, DataTable, Drawing, Figure, Strong, Struck, Table, Word
 from explorer.report.design import design_report
 from explorer.report.diagnosis import diagnosis_report
 from explorer.report.folder import MANIFEST, NO_FIGURES, bibtex, write_report
@@ -290,6 +290,27 @@ def test_a_surface_of_noise_is_no_calibration_whatever_the_fresh_pours_say(study
     (table,) = report.sections[0].blocks
     assert all(isinstance(row[2], Struck) for row in table.rows)
     assert "<s>" in page(report)
+
+
+def test_of_several_targets_the_verdict_names_every_one():
+    report = study_report(reported_studies.typed(reported_studies.result_of_case("two targets")))
+    assert report.banner.word is Word.CALIBRATED
+    assert re.search(
+        r"gave \S+° against \S+° measured \(angle of repose, silhouette\) and \S+ kg/m³ against \S+ kg/m³ measured "
+        r"\(bulk density kg m3\)",
+        report.banner.why,
+    )
+    assert report.banner.why.count("equivalent to the measurement within") == 2
+    overview = next(section for section in report.sections if section.title == "In short")
+    facts = dict(overview.blocks[0].pairs)
+    assert {"Verification (bulk density kg m3)", "Noise of one pour (bulk density kg m3)"} <= set(facts)
+    assert not any("One number cannot fix" in block.text for block in overview.blocks if isinstance(block, Caution))
+    ascent = next(section for section in report.sections if section.title == "Steepest ascent")
+    assert [block.name for block in ascent.blocks if isinstance(block, Figure)] == ["ascent", "ascent-2"]
+    *_, together = [block for block in ascent.blocks if isinstance(block, Table)]
+    assert together.header[-2:] == ("misfit J", "desirability")
+    assert "All 2 targets together are missed least at step" in ascent.blocks[0].text
+    assert any("Derringer" in text for text in page(report).split("<li>"))
 
 
 # Joined
