@@ -134,7 +134,17 @@ class Approach(Record):
     missed: FloatArray
     reached: bool
     resolved: bool
-    statement: str
+
+    def words(self, names: Sequence[str]) -> str:
+        """Return what was found as sentences; names: of the targets."""
+        worst = int(np.argmax(np.abs(self.missed)))
+        text = (
+            f"All {len(names)} targets together are missed least at step {self.position + 1:.1f}, by at most "
+            f"{abs(self.missed[worst]):.1f} standard errors ({names[worst]})."
+        )
+        if not self.reached:
+            return f"{text} The path does not meet all of them."
+        return text if self.resolved else f"{text} The steps do not tell that place from the ends of the path."
 
 
 @dataclass(frozen=True)
@@ -204,7 +214,6 @@ def joint_path(
 
 
 def approach(
-    names: Sequence[str],
     means: npt.ArrayLike,
     goals: npt.ArrayLike,
     spreads: npt.ArrayLike,
@@ -213,10 +222,10 @@ def approach(
 ) -> Approach:
     """Find where a path misses several targets least.
 
-    names: of the targets. means: mean response, NaN where no run is valid; spreads: standard error of mean and goal
-    together; both of shape (targets, steps). goals, weights, margins: shape (targets,). Desirability: max(0, 1 - |mean
-    - goal|/margin), over the targets as the geometric mean by weight. Raises StatisticsError without a step at which
-    every target has a valid run.
+    means: mean response, NaN where no run is valid; spreads: standard error of mean and goal together; both of shape
+    (targets, steps). goals, weights, margins: shape (targets,). Desirability: max(0, 1 - |mean - goal|/margin), over
+    the targets as the geometric mean by weight. Raises StatisticsError without a step at which every target has a
+    valid run.
     """
     means, goals, weights = (np.asarray(one, dtype=np.float64) for one in (means, goals, weights))
     standardised = (means - goals[:, None]) / np.asarray(spreads, dtype=np.float64)
@@ -243,15 +252,6 @@ def approach(
     rises = [misfit[side][np.isfinite(misfit[side])] for side in (slice(0, upper), slice(lower + 1, None))]
     reached = bool(np.abs(missed).max() <= REACHED)
     resolved = all(bool((side > least + RISE).any()) for side in rises)
-    worst = int(np.argmax(np.abs(missed)))
-    statement = (
-        f"All {len(goals)} targets together are missed least at step {position + 1:.1f}: {names[worst]} by "
-        f"{abs(missed[worst]):.1f} standard errors, the others by no more."
-    )
-    if not reached:
-        statement += " The path does not meet all of them."
-    elif not resolved:
-        statement += " The steps do not tell that place from the ends of the path."
     return Approach(
         standardised=standardised,
         misfit=misfit,
@@ -262,7 +262,6 @@ def approach(
         missed=missed,
         reached=reached,
         resolved=resolved,
-        statement=statement,
     )
 
 

@@ -85,7 +85,7 @@ class AscentResult(Record):
     def line(self) -> str:
         """One line of what the ascent found."""
         if self.approach is not None:
-            return self.approach.statement
+            return self.approach.words([walk.observable for walk in self.walks])
         return f"{', '.join(f'{mean:.1f}' for mean in self.means)}. {self.bracket.statement}"
 
     @property
@@ -207,7 +207,6 @@ def _approach(walks: Sequence[TargetWalk], targets: Sequence[Target]) -> Approac
     sizes = np.array([[target.standard_error] for target in targets])
     spreads = np.hypot(np.array([walk.standard_error for walk in walks]), sizes)
     return approach(
-        [walk.observable for walk in walks],
         [walk.means for walk in walks],
         goals,
         np.maximum(spreads, np.maximum(LEAST_SPREAD * np.abs(goals), sys.float_info.min)[:, None]),

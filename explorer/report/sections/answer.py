@@ -42,14 +42,15 @@ def banner(result: StudyResult) -> Banner:
     poured, said = _poured(targets, tests), _said(targets, tests)
     shown = (single.better_than_noise, *(anova.better_than_noise for anova in result.surface.anova[1:]))
     noisy = [one for one, good in zip(targets, shown, strict=True) if not good]
-    ends = (observed(result.study.targets[0].observable, end) for end in (single.reachable_low, single.reachable_high))
+    ends = (observed(targets[0].observable, end) for end in (single.reachable_low, single.reachable_high))
     reach = " … ".join(ends)
     if not single.reached and verdicts != {"equivalent"}:
-        first = result.study.targets[0].observable
+        first = targets[0].observable
+        named = f" ({observable_label(first)})" if len(targets) > 1 else ""
         return Banner(
             Word.OUT_OF_REACH,
             "",
-            f"No setting of the region gives {observed(first, single.target)}: the model reaches {reach}, and "
+            f"No setting of the region gives {observed(first, single.target)}{named}: the model reaches {reach}, and "
             f"{poured}.",
             "Widen the ranges of the factors that act, or add a factor that is missing: for round bodies rolling "
             "resistance, `effect.rolling_resistance.rolling_friction`.",
@@ -122,7 +123,7 @@ def _said(targets: Sequence[Target], tests: Sequence[Verification]) -> str:
     if len(targets) == 1:
         return verdict(targets[0], tests[0])
     pairs = zip(targets, tests, strict=True)
-    return "; ".join(f"{observable_label(one.observable)} {_outcome(one, test)}" for one, test in pairs) + "."
+    return "; ".join(f"{_outcome(one, test)} ({observable_label(one.observable)})" for one, test in pairs) + "."
 
 
 ANSWER = 3

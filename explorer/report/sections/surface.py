@@ -47,12 +47,12 @@ def ascent(result: StudyResult) -> Section:
         direction = "Direction and steps follow the effects on the target's own observable; base factor"
         blocks: list[Block] = [Text(f"{direction} {walk.path.base}. {walk.bracket.statement} {apart}")]
     else:
-        labels = enumeration([observable_label(one.observable) for one in walk.walks])
+        labels = [observable_label(one.observable) for one in walk.walks]
         blocks = [
             Text(
                 "The walk leads from the centre to where the screening's first-order models miss all targets "
-                f"({labels}) least, in the weighted squares of their standard errors by which the optimum is chosen; "
-                f"base factor {walk.path.base}. {walk.approach.statement} {apart}"
+                f"({enumeration(labels)}) least, in the weighted squares of their standard errors by which the optimum "
+                f"is chosen; base factor {walk.path.base}. {walk.approach.words(labels)} {apart}"
             )
         ]
     for place, (one, target) in enumerate(zip(walk.walks, result.study.targets, strict=False), start=1):

@@ -12,7 +12,9 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
+from doe.analysis.verification import verify
 from doe.provenance import About
+from doe.stages.surface import CONTRADICTION
 from explorer.design.analysis import AnalyseOrder, run_analyse
 from explorer.errors import CommandError
 from explorer.report import folder, study_report
@@ -311,6 +313,27 @@ def test_of_several_targets_the_verdict_names_every_one():
     assert together.header[-2:] == ("misfit J", "desirability")
     assert "All 2 targets together are missed least at step" in ascent.blocks[0].text
     assert any("Derringer" in text for text in page(report).split("<li>"))
+
+
+def test_of_several_targets_any_may_spoil_the_verdict():
+    found = reported_studies.typed(reported_studies.result_of_case("two targets"))
+    spoiled = (found.surface.anova[0], dataclasses.replace(found.surface.anova[1], better_than_noise=False))
+    noisy = study_report(dataclasses.replace(found, surface=dataclasses.replace(found.surface, anova=spoiled))).banner
+    assert noisy.word is Word.NOT_CALIBRATED
+    assert noisy.why.startswith("The response surface of the bulk density kg m3 is not better than noise")
+    first, second = found.verification.tests
+    far = verify(second.target.mean + np.arange(40.0, 46.0), second.target.mean, 2.0, 10, 2.0)
+    missed = dataclasses.replace(
+        found,
+        verification=dataclasses.replace(found.verification, tests=(first, far)),
+        optimum=dataclasses.replace(
+            found.optimum, posterior=dataclasses.replace(found.optimum.posterior, p=CONTRADICTION / 2)
+        ),
+    )
+    banner = study_report(missed).banner
+    assert banner.word is Word.OUT_OF_REACH
+    assert "No setting of the region gives all targets at once (χ², p = 0.0050)" in banner.why
+    assert banner.why.count(" measured (") == 2
 
 
 # Joined
