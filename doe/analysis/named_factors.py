@@ -267,14 +267,28 @@ def orders_of(levels: Sequence[int]) -> dict[Order, tuple[str, ...]]:
     return {one: tuple(dict.fromkeys(map(term_of, model_terms(levels, one).names[1:]))) for one in ORDERS}
 
 
+def order_of_names(coded: FloatArray, levels: Sequence[int], block: IntArray | None = None) -> Order | None:
+    """Return the highest order that runs at `coded`, (runs, k), bear; None where they leave no error.
+
+    levels: number of names per factor, 0 of a number. block: in which each run is made, (runs,), from 0; None or empty
+    without blocks. The highest leaves 3 degrees of freedom for the error, if any does.
+    """
+    n = len(coded)
+    own = np.zeros(n, dtype=np.int64) if block is None or not block.size else block
+    names = () if block is None or not block.size else tuple(map(str, range(int(block.max()) + 1)))
+    return _highest(_Runs(coded, np.zeros(n), np.arange(n), own, names, tuple(levels)))
+
+
+def _highest(runs: _Runs) -> Order | None:
+    df = {order: runs.df(terms) for order, terms in orders_of(runs.levels).items()}
+    able = [order for order in df if df[order] >= 1]
+    roomy = [order for order in able if df[order] >= LEAST_DF]
+    return [None, *able, *roomy][-1]
+
+
 def _terms(runs: _Runs, order: Order | None) -> tuple[str, ...]:
     """The terms of an order, or of the highest that the runs bear."""
-    orders = orders_of(runs.levels)
-    if order is not None:
-        return orders[order]
-    able = [terms for terms in orders.values() if runs.df(terms) >= 1]
-    roomy = [terms for terms in able if runs.df(terms) >= LEAST_DF]
-    return [orders["linear"], *able, *roomy][-1]
+    return orders_of(runs.levels)[order or _highest(runs) or "linear"]
 
 
 def _unbearable(runs: _Runs, terms: tuple[str, ...]) -> str:

@@ -4,6 +4,12 @@ Notation: sigma = standard deviation of one run; SE = standard error of the effe
 is tested by t = estimate/SE against Student's t, and under delta that t is noncentral with shift delta/SE.
 Source: Cohen 1988, Statistical Power Analysis, ch. 2; computed by statsmodels.
 
+A factor of three names and more is tested by all t columns of its term together: F = SS/(t s²) is noncentral with
+λ = (delta/SE)². The change delta is that between two names, the others midway, the pattern that is seen least (Cohen
+1988, ch. 8), taken over the two names of which it is; then 1/SE² = |(I - P) v|²/sigma², v the change of 1 at every run
+and P the projection onto the columns of all other terms. With equal numbers of runs SE is the standard error of the
+difference of two means. With t = 1 this is the t test above.
+
 The change of the response is counted from low to high for a factor and for an interaction (2 b), from the centre to the
 ends for a square (b). Its SE in a design is sigma sqrt([(X'X)^-1]_jj), times two for 2 b.
 """
@@ -12,14 +18,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
-from scipy import optimize
+from scipy import optimize, stats
 
+from doe.analysis.named_factors import columns_of, term_of
 from doe.analysis.surface import block_columns, included_terms, second_order_terms, term_names, with_intercept
+from doe.designs.design import factor_letters
+from doe.designs.optimal import codes
 from doe.errors import StatisticsError
 from doe.record import Record
 
@@ -30,7 +40,8 @@ MAX_REPLICATES = 100_000
 
 @dataclass(frozen=True)
 class TermPrecision(Record):
-    """Worst term of a kind ("factor", "interaction", "square"); unit of sigma.
+    """Worst term of a kind ("factor", "name", "interaction", "square"); unit of sigma. "name": a factor of three names
+    and more. df_term: columns that the term is tested by together.
 
     smallest: change that is seen with chance `power_wanted` at p < alpha; all: the same for all terms at once
     (Bonferroni). power: chance to see `effect`; NaN without one. NaN where no degree of freedom is left for the error.
@@ -44,6 +55,11 @@ class TermPrecision(Record):
     smallest_of_all: float
     effect: float
     power: float
+    df_term: int = 1
+
+    def chance(self, change: float) -> float:
+        """Return the chance to see a change of that size at p < 0.05."""
+        return term_power(change, self.standard_error, self.df, self.df_term)
 
 
 def precision(
@@ -61,9 +77,7 @@ def precision(
     block: in which each run is made, (runs,), from 0; None or empty where there are no blocks.
     Raises StatisticsError for a sigma or an effect that is not positive, or terms that the runs cannot separate.
     """
-    for name, value in (("sigma", sigma), ("effect", effect)):
-        if not (value > 0 or (name == "effect" and math.isnan(value))) or math.isinf(value):
-            raise StatisticsError(f"{name} = {value:g} must be a positive number")
+    _require_noise(sigma, effect)
     included = included_terms(names, terms)
     model = second_order_terms(coded)[:, included]
     if block is not None and block.size:
@@ -96,6 +110,82 @@ def precision(
     return tuple(found)
 
 
+def precision_of_names(
+    coded: FloatArray,
+    levels: Sequence[int],
+    terms: Sequence[str],
+    sigma: float,
+    effect: float = math.nan,
+    alpha: float = 0.05,
+    block: npt.NDArray[np.int64] | None = None,
+) -> tuple[TermPrecision, ...]:
+    """Return the same where factors are names.
+
+    levels: number of names per factor, 0 of a number; coded: of a factor of names the codes of `doe.designs.optimal`.
+    terms: as of `doe.analysis.named_factors.orders_of`. The others, and what is refused, as of `precision`.
+    """
+    _require_noise(sigma, effect)
+    columns = columns_of(levels, terms)
+    model = columns.matrix(coded)
+    own = [term_of(name) for name in columns.names]
+    if block is not None and block.size:
+        model = np.column_stack([model, block_columns(block, int(block.max()) + 1)])
+    if np.linalg.matrix_rank(model) < model.shape[1]:
+        raise StatisticsError(f"the {len(coded)} runs cannot separate the {model.shape[1]} columns of the model")
+    df = model.shape[0] - model.shape[1]
+    worst: dict[str, TermPrecision] = {}
+    for term in terms:
+        of_term = np.array([name == term for name in own] + [False] * (model.shape[1] - len(own)))
+        others = model[:, ~of_term]
+        changes = _changes(coded, levels, term)
+        seen = changes - others @ np.linalg.lstsq(others, changes, rcond=None)[0]
+        error, df_term = sigma / math.sqrt(float((seen**2).sum(axis=0).min())), int(of_term.sum())
+        known = df >= 1 and math.isfinite(effect)
+        found = TermPrecision(
+            kind="name" if "*" not in term and df_term > 1 else _kind(term),
+            terms=1,
+            standard_error=error,
+            df=df,
+            smallest=smallest_effect(error, df, alpha, df_term=df_term),
+            smallest_of_all=smallest_effect(error, df, alpha / len(terms), df_term=df_term),
+            effect=effect,
+            power=term_power(effect, error, df, df_term, alpha) if known else math.nan,
+            df_term=df_term,
+        )
+        before = worst.get(found.kind, found)
+        # Without a degree of freedom for the error there is no smallest change to compare by.
+        poorer = max(before, found, key=lambda one: (np.nan_to_num(one.smallest), one.standard_error))
+        worst[found.kind] = replace(poorer, terms=before.terms + (found.kind in worst))
+    return tuple(worst[kind] for kind in ("factor", "name", "interaction", "square") if kind in worst)
+
+
+def _changes(coded: FloatArray, levels: Sequence[int], term: str) -> FloatArray:
+    """Every change of 1 by `term` at the runs, shape (runs, changes), in the pattern that the module names."""
+    letters = factor_letters(len(levels))
+    if term.endswith("^2"):
+        return coded[:, [letters.index(term.removesuffix("^2"))]] ** 2
+    changes = np.full((len(coded), 1), 0.5)
+    for letter in term.split("*"):
+        factor = letters.index(letter)
+        patterns = coded[:, [factor]]
+        if names := levels[factor]:
+            of_run = np.abs(coded[:, [factor]] - codes(names)).argmin(axis=1)
+            ends = np.eye(names)[of_run]
+            patterns = np.column_stack([ends[:, b] - ends[:, a] for a, b in combinations(range(names), 2)])
+        changes = (changes[:, :, None] * patterns[:, None, :]).reshape(len(coded), -1)
+    return changes
+
+
+def term_power(effect: float, standard_error: float, df: float, df_term: int, alpha: float = 0.05) -> float:
+    """Return the chance that the test of a term by `df_term` columns together rejects at level `alpha`.
+
+    `effect` and `standard_error` as of the module, of which the noncentral F has the shift (effect/SE)².
+    """
+    if df_term == 1:
+        return t_test_power(effect, standard_error, df, alpha)
+    return float(stats.ncf.sf(stats.f.isf(alpha, df_term, df), df_term, df, (effect / standard_error) ** 2))
+
+
 def t_test_power(effect: float, standard_error: float, df: float, alpha: float = 0.05) -> float:
     """Return the chance that a two-sided t test at level `alpha` rejects when the true effect is `effect`.
 
@@ -109,14 +199,17 @@ def t_test_power(effect: float, standard_error: float, df: float, alpha: float =
     return float(min(1.0, beyond + (opposite if np.isfinite(opposite) else 0.0)))
 
 
-def smallest_effect(standard_error: float, df: float, alpha: float = 0.05, power: float = 0.8) -> float:
+def smallest_effect(
+    standard_error: float, df: float, alpha: float = 0.05, power: float = 0.8, df_term: int = 1
+) -> float:
     """Return the effect that a two-sided t test detects with chance `power`, in the unit of `standard_error`.
 
-    NaN without degrees of freedom; zero when the standard error is zero.
+    df_term: columns that a term is tested by together, by F where there are several (`term_power`). NaN without
+    degrees of freedom; zero when the standard error is zero.
     """
     if df < 1 or not math.isfinite(standard_error):
         return math.nan
-    return standard_error * _smallest_shift(df, alpha, power) if standard_error > 0 else 0.0
+    return standard_error * _smallest_shift(df, alpha, power, df_term) if standard_error > 0 else 0.0
 
 
 def smallest_difference(sigma: float, replicates: int, alpha: float = 0.05, power: float = 0.8) -> float:
@@ -223,11 +316,11 @@ def replicates_for_linear_effect(
 
 
 @lru_cache(maxsize=4096)
-def _smallest_shift(df: float, alpha: float, power: float) -> float:
+def _smallest_shift(df: float, alpha: float, power: float, df_term: int) -> float:
     """Return the effect in standard errors; the same few are asked for again and again."""
 
     def shortfall(shift: float) -> float:
-        return t_test_power(shift, 1.0, df, alpha) - power
+        return term_power(shift, 1.0, df, df_term, alpha) - power
 
     upper = 2.0
     while shortfall(upper) < 0:
@@ -250,6 +343,12 @@ def _least_replicates(least: int, enough: Callable[[int], bool], effect: float, 
         middle = (lower + upper) // 2
         lower, upper = (lower, middle) if enough(middle) else (middle + 1, upper)
     return lower
+
+
+def _require_noise(sigma: float, effect: float) -> None:
+    for name, value in (("sigma", sigma), ("effect", effect)):
+        if not (value > 0 or (name == "effect" and math.isnan(value))) or math.isinf(value):
+            raise StatisticsError(f"{name} = {value:g} must be a positive number")
 
 
 def _require_positive(**values: float) -> None:

@@ -5,13 +5,29 @@ In coded units (low = -1, high = +1) the direction of factor i is d_i = effect_i
 factor of the largest |effect| as base, so that a step moves factor i by d_i x (base step). Because a *target*
 is wanted and no maximum, all steps are run and the pair between which the error changes sign brackets the
 target. Source: Box and Wilson 1951, J. R. Stat. Soc. B 13:1; Myers, Montgomery and Anderson-Cook 2016, ch. 5.
+
+Of several targets the walk leads to where all of them are missed least, in the measure by which the optimum is chosen
+(`optimum.py`), with the first-order models ŷ_t(x) = ȳ_t + b_t·x of the screening, b_t = effects of target t/2:
+
+    J(x) = Σ_t w_t (ŷ_t(x) − T_t)²/s_t² + |x|²
+
+s_t² = (standard error of the target)² + (that of ȳ_t)². The least is in closed form,
+
+    x* = (I + Σ_t w_t b_t b_tᵀ/s_t²)⁻¹ Σ_t w_t b_t (T_t − ȳ_t)/s_t²
+
+and the line through the centre and x* is walked. |x|² counts half a range as much as one standard error, so that an
+effect within noise turns the walk little. With one target x* is a multiple of b, so that this is the walk of steepest
+ascent; the gradient of J alone would follow whichever target is known best. Source: least squares damped by Levenberg
+1944, Q. Appl. Math. 2:164, which is ridge analysis (Myers, Montgomery and Anderson-Cook 2016, ch. 6); several responses
+in one measure: ibid. ch. 7; desirability, told beside it: Derringer and Suich 1980, J. Qual. Technol. 12:214,
+doi 10.1080/00224065.1980.11980968.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -24,6 +40,10 @@ FloatArray = npt.NDArray[np.float64]
 
 LEAST_SHARE = 0.25
 """Half-width of a region, at least, as a share of a factor's range."""
+REACHED = 2.0
+"""Standard errors by which a target may be missed where a path meets it, as in `optimum.py`."""
+RISE = 3.84
+"""By which the misfit rises along a path out of the 95 % interval of its place: chi-squared, one degree of freedom."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +100,54 @@ class Bracket(Record):
 
 
 @dataclass(frozen=True)
+class FirstOrder:
+    """First-order model of one target over the screened ranges.
+
+    mean: response at the centre; effects: mean(high) - mean(low) of each factor, shape (factors,); goal: the measured
+    value; spread: s_t, standard error of the goal and of `mean` together, above zero; weight: w_t.
+    """
+
+    mean: float
+    effects: FloatArray
+    goal: float
+    spread: float
+    weight: float
+
+
+@dataclass(frozen=True)
+class Approach(Record):
+    """Where a path comes nearest to several targets at once, between its steps along straight lines.
+
+    standardised: (mean - goal)/s per target and step, shape (targets, steps). misfit: J = sum of weight x
+    standardised^2 per step and desirability, shape (steps,), NaN where a target has no valid run. position: place of
+    the least J, counted in steps; lower, upper: the steps on both sides; missed: the standardised misses there, shape
+    (targets,). reached: none of them is more than 2. resolved: J rises by more than 3.84 (chi-squared, one degree of
+    freedom, 95 %) on both sides.
+    """
+
+    standardised: FloatArray
+    misfit: FloatArray
+    desirability: FloatArray
+    lower: int
+    upper: int
+    position: float
+    missed: FloatArray
+    reached: bool
+    resolved: bool
+
+    def words(self, names: Sequence[str]) -> str:
+        """Return what was found as sentences; names: of the targets."""
+        worst = int(np.argmax(np.abs(self.missed)))
+        text = (
+            f"All {len(names)} targets together are missed least at step {self.position + 1:.1f}, by at most "
+            f"{abs(self.missed[worst]):.1f} standard errors ({names[worst]})."
+        )
+        if not self.reached:
+            return f"{text} The path does not meet all of them."
+        return text if self.resolved else f"{text} The steps do not tell that place from the ends of the path."
+
+
+@dataclass(frozen=True)
 class Region(Record):
     """A box in natural units for the next design: coded x = (value - centre)/half_width; arrays of shape
     (factors,).
@@ -126,6 +194,77 @@ def ascent_path(factors: Sequence[AscentFactor], centre_response: float, steps: 
     )
 
 
+def joint_path(
+    names: Sequence[str], low: npt.ArrayLike, high: npt.ArrayLike, models: Sequence[FirstOrder], steps: int = 6
+) -> AscentPath:
+    """Return the walk through the centre towards x*, where the first-order models miss their goals least (see above).
+
+    low, high: screened ranges, natural units, shape (factors,). The walk is that of `ascent_path` with x* in place of
+    the effects: it comes from the far side and leads on as far as the ranges allow. `predicted` is that of the first
+    model. Raises StatisticsError as `ascent_path`; all goals met at the centre leave no direction.
+    """
+    slopes = np.array([model.effects / 2 for model in models])
+    precision = np.array([model.weight / model.spread**2 for model in models])
+    missing = np.array([model.goal - model.mean for model in models])
+    matrix = np.eye(slopes.shape[1]) + (slopes.T * precision) @ slopes
+    towards = np.linalg.solve(matrix, slopes.T @ (precision * missing))
+    ends = zip(names, np.asarray(low, dtype=float), np.asarray(high, dtype=float), towards, strict=True)
+    path = ascent_path([AscentFactor(name, float(a), float(b), float(x)) for name, a, b, x in ends], 0.0, steps)
+    return replace(path, predicted=models[0].mean + path.coded @ slopes[0])
+
+
+def approach(
+    means: npt.ArrayLike,
+    goals: npt.ArrayLike,
+    spreads: npt.ArrayLike,
+    weights: npt.ArrayLike,
+    margins: npt.ArrayLike,
+) -> Approach:
+    """Find where a path misses several targets least.
+
+    means: mean response, NaN where no run is valid; spreads: standard error of mean and goal together; both of shape
+    (targets, steps). goals, weights, margins: shape (targets,). Desirability: max(0, 1 - |mean - goal|/margin), over
+    the targets as the geometric mean by weight. Raises StatisticsError without a step at which every target has a
+    valid run.
+    """
+    means, goals, weights = (np.asarray(one, dtype=np.float64) for one in (means, goals, weights))
+    standardised = (means - goals[:, None]) / np.asarray(spreads, dtype=np.float64)
+    misfit = weights @ standardised**2
+    valid = np.flatnonzero(np.isfinite(misfit))
+    if valid.size == 0:
+        raise StatisticsError("no step of the path has a valid run for every target")
+    single = np.maximum(0.0, 1.0 - np.abs(means - goals[:, None]) / np.asarray(margins, dtype=np.float64)[:, None])
+    places = [(int(valid[0]), int(valid[0]), 0.0)]
+    for i, j in pairwise(valid):
+        change = standardised[:, j] - standardised[:, i]
+        steep = float(weights @ change**2)
+        share = float(np.clip(-(weights * change) @ standardised[:, i] / steep, 0.0, 1.0)) if steep > 0 else 0.5
+        places.append((int(i), int(j), share))
+
+    def at(place: tuple[int, int, float]) -> FloatArray:
+        i, j, share = place
+        return np.asarray(standardised[:, i] + share * (standardised[:, j] - standardised[:, i]))
+
+    best = min(places, key=lambda place: float(weights @ at(place) ** 2))
+    lower, upper, share = best
+    missed = at(best)
+    least, position = float(weights @ missed**2), lower + share * (upper - lower)
+    rises = [misfit[side][np.isfinite(misfit[side])] for side in (slice(0, upper), slice(lower + 1, None))]
+    reached = bool(np.abs(missed).max() <= REACHED)
+    resolved = all(bool((side > least + RISE).any()) for side in rises)
+    return Approach(
+        standardised=standardised,
+        misfit=misfit,
+        desirability=np.prod(single ** (weights / weights.sum())[:, None], axis=0),
+        lower=lower,
+        upper=upper,
+        position=position,
+        missed=missed,
+        reached=reached,
+        resolved=resolved,
+    )
+
+
 def bracket(path_means: npt.ArrayLike, target: float, standard_errors: npt.ArrayLike | None = None) -> Bracket:
     """Find the neighbouring steps between which the response passes the target.
 
@@ -164,8 +303,8 @@ def bracket(path_means: npt.ArrayLike, target: float, standard_errors: npt.Array
     return Bracket(target, lower, upper, position, True, resolved, nearest, len(pairs), errors, relative, statement)
 
 
-def region_around(path: AscentPath, found: Bracket, minimum_share: float = LEAST_SHARE) -> Region:
-    """Return the box of the Box–Behnken design: centred where the path meets the target, within the ranges.
+def region_around(path: AscentPath, found: Bracket | Approach, minimum_share: float = LEAST_SHARE) -> Region:
+    """Return the box of the next design, within the ranges, centred where the path meets the target, or all best.
 
     The half-width of a factor is one step of the path, but at least `minimum_share` of its range (a factor
     that the path hardly moves would otherwise drown in noise) and at most half of it. A box that would leave

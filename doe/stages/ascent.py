@@ -1,8 +1,10 @@
-"""Steepest ascent: a walk along the fitted effects until the response passes the target."""
+"""Steepest ascent: a walk along the fitted effects until the response passes the target, or comes nearest to all."""
 
 from __future__ import annotations
 
 import math
+import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,12 +14,16 @@ from doe.analysis.power import smallest_effect
 from doe.analysis.screening import SIGNIFICANT
 from doe.analysis.steepest_ascent import (
     LEAST_SHARE,
+    Approach,
     AscentFactor,
     AscentPath,
     Bracket,
+    FirstOrder,
     Region,
+    approach,
     ascent_path,
     bracket,
+    joint_path,
     region_around,
 )
 from doe.record import Record
@@ -26,13 +32,36 @@ from doe.stages.screening import ScreeningResult
 from doe.stages.stage import Chain, Stage, ended
 from doe.studies.profile import Profile
 from doe.studies.study import Factor, Study
+from doe.target import Target
+
+WHOLE = 0.5
+"""Half-width of a region that is the whole of a factor's range, as a share of it."""
+LEAST_SPREAD = 1e-6
+"""Least standard error of a target, over its own size or that of its response."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TargetWalk(Record):
+    """What a walk gave in the observable of one target; arrays of shape (steps,), NaN without enough valid runs."""
+
+    observable: str
+    predicted: FloatArray
+    """By the first-order model of the screening."""
+    means: FloatArray
+    sd: FloatArray
+    standard_error: FloatArray
+    relative_error_percent: FloatArray
+    smallest_difference: float
+    """Difference between two steps that would have been seen with power 0.8."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class AscentResult(Record):
-    """The path, what it gave in the target's observable, and the region of the next design.
+    """The path, what it gave in the observable of the first target, and the region of the next design.
 
-    ``means``, ``sd``, ``standard_error``: shape (steps,), NaN where no run is valid or only one.
+    ``means``, ``sd``, ``standard_error``: shape (steps,), NaN where no run is valid or only one. With several targets
+    ``others`` says the same of those beside the first, and ``approach`` where the walk comes nearest to all of them;
+    ``bracket`` is that of the first target in any case.
     """
 
     factors: tuple[Factor, ...]
@@ -49,73 +78,155 @@ class AscentResult(Record):
     smallest_difference: float
     """Difference between two steps that would have been seen with power 0.8."""
     notes: tuple[str, ...]
+    others: tuple[TargetWalk, ...] = ()
+    approach: Approach | None = None
 
     @property
     def line(self) -> str:
         """One line of what the ascent found."""
+        if self.approach is not None:
+            return self.approach.words([walk.observable for walk in self.walks])
         return f"{', '.join(f'{mean:.1f}' for mean in self.means)}. {self.bracket.statement}"
 
+    @property
+    def walks(self) -> tuple[TargetWalk, ...]:
+        """What the walk gave, per target in the study's order; the first alone in results of before there were more."""
+        first = TargetWalk(
+            observable=self.observable,
+            predicted=self.path.predicted,
+            means=self.means,
+            sd=self.sd,
+            standard_error=self.standard_error,
+            relative_error_percent=self.relative_error_percent,
+            smallest_difference=self.smallest_difference,
+        )
+        return (first, *self.others)
 
-def ascent(study: Study, profile: Profile, runner: Runner, screened: ScreeningResult, noise: Noise) -> AscentResult:
-    """Walk the selected factors from the low end of the response to the high end.
 
-    Direction, steps and prediction come from the effects on the target's own observable, whichever estimator selected
-    the factors: the walk has to arrive at the measured value. ``noise`` of that observable is the pilot's, which
-    knows the spread of one run better than the few runs of a step. In a study of several experiments the region is the
-    whole of the ranges: the walk knows the first target only.
+def ascent(
+    study: Study, profile: Profile, runner: Runner, screened: ScreeningResult, noise: Mapping[str, Noise]
+) -> AscentResult:
+    """Walk the selected factors from the low end of the response to the high end, or towards all targets at once.
+
+    Direction, steps and prediction come from the effects on the targets' own observables, whichever estimator selected
+    the factors: the walk has to arrive at the measured values. ``noise``: observable → the pilot's, which knows the
+    spread of one run better than the few runs of a step. Of several targets the region is narrowed only where the walk
+    meets all of them, and its steps tell where: elsewhere their solutions may cross far from it.
     """
-    target = study.targets[0]
     by_name = {factor.name: factor for factor in study.factors}
-    effects = {effect.name: effect.effect for effect in screened.target_analysis.effects}
     factors = tuple(by_name[chosen.name] for chosen in screened.selected)
-    walk = [AscentFactor(f.name, float(f.low), float(f.high), effects[f.name]) for f in factors]
-    path = ascent_path(walk, screened.target_analysis.mean, steps=profile.ascent_steps)
-    # Where the solutions of several experiments cross may be far from where the walk passes the first target's.
-    share = 0.5 if study.experiments else LEAST_SHARE
+    models = [_first_order(screened, factors, target, noise[target.observable]) for target in study.targets]
+    path = _path(factors, models, profile.ascent_steps)
     settings = [
         Setting(
             f"step {k + 1}",
             {f.path: float(v) for f, v in zip(factors, step, strict=True)},
             profile.ascent_replicates,
+            study.all_experiments,
         )
         for k, step in enumerate(path.natural)
     ]
     rows = runner.run("ascent", settings)
-    table = responses(rows, target.observable)
-    n = (~np.isnan(table)).sum(axis=1)
-    means = np.array([row[~np.isnan(row)].mean() if k else math.nan for row, k in zip(table, n, strict=True)])
-    sd = np.array([row[~np.isnan(row)].std(ddof=1) if k > 1 else math.nan for row, k in zip(table, n, strict=True)])
-    error = noise.sigma / np.sqrt(np.maximum(n, 1))
-    found = bracket(means, target.mean, standard_errors=error)
+    walks = [
+        _walk(
+            responses(rows, target.observable),
+            model.mean + path.coded @ model.effects / 2,
+            target,
+            noise[target.observable],
+            profile,
+        )
+        for target, model in zip(study.targets, models, strict=True)
+    ]
+    first, target = walks[0], study.targets[0]
+    found = bracket(first.means, target.mean, standard_errors=first.standard_error)
+    joint = None if len(walks) == 1 else _approach(walks, study.targets)
+    narrow = joint is None or (joint.reached and joint.resolved)
     return AscentResult(
         factors=factors,
         path=path,
-        observable=target.observable,
-        means=means,
-        sd=sd,
-        standard_error=error,
-        relative_error_percent=100 * np.abs(means - target.mean) / abs(target.mean),
+        observable=first.observable,
+        means=first.means,
+        sd=first.sd,
+        standard_error=first.standard_error,
+        relative_error_percent=first.relative_error_percent,
         settings=tuple(settings),
         runs=tuple(tuple(runs) for runs in rows),
         bracket=found,
-        region=region_around(path, found, share),
-        smallest_difference=smallest_effect(noise.sigma * math.sqrt(2.0 / profile.ascent_replicates), noise.runs - 1),
-        notes=_notes(screened),
+        region=region_around(path, joint or found, LEAST_SHARE if narrow else WHOLE),
+        smallest_difference=first.smallest_difference,
+        notes=_notes(screened, study.targets),
+        others=tuple(walks[1:]),
+        approach=joint,
     )
 
 
-def _notes(screened: ScreeningResult) -> tuple[str, ...]:
+def _first_order(screened: ScreeningResult, factors: Sequence[Factor], target: Target, noise: Noise) -> FirstOrder:
+    """The screening's model of ``target`` over ``factors``."""
+    found = screened.further_analyses.get(target.observable, screened.target_analysis)
+    effects = {effect.name: effect.effect for effect in found.effects}
+    spread = math.hypot(target.standard_error, noise.sigma / math.sqrt(found.runs))
+    least = max(LEAST_SPREAD * max(abs(target.mean), abs(found.mean)), sys.float_info.min)
+    return FirstOrder(
+        mean=found.mean,
+        effects=np.array([effects[factor.name] for factor in factors]),
+        goal=target.mean,
+        spread=max(spread, least),
+        weight=target.weight,
+    )
+
+
+def _path(factors: Sequence[Factor], models: Sequence[FirstOrder], steps: int) -> AscentPath:
+    if len(models) > 1:
+        names, low, high = zip(*((f.name, float(f.low), float(f.high)) for f in factors), strict=True)
+        return joint_path(names, low, high, models, steps)
+    walk = [
+        AscentFactor(f.name, float(f.low), float(f.high), float(effect))
+        for f, effect in zip(factors, models[0].effects, strict=True)
+    ]
+    return ascent_path(walk, models[0].mean, steps=steps)
+
+
+def _walk(table: FloatArray, predicted: FloatArray, target: Target, noise: Noise, profile: Profile) -> TargetWalk:
+    """What a walk gave, of ``table`` of its runs, shape (steps, replicates)."""
+    n = (~np.isnan(table)).sum(axis=1)
+    means = np.array([row[~np.isnan(row)].mean() if k else math.nan for row, k in zip(table, n, strict=True)])
+    return TargetWalk(
+        observable=target.observable,
+        predicted=predicted,
+        means=means,
+        sd=np.array([row[~np.isnan(row)].std(ddof=1) if k > 1 else math.nan for row, k in zip(table, n, strict=True)]),
+        standard_error=noise.sigma / np.sqrt(np.maximum(n, 1)),
+        relative_error_percent=100 * np.abs(means - target.mean) / abs(target.mean),
+        smallest_difference=smallest_effect(noise.sigma * math.sqrt(2.0 / profile.ascent_replicates), noise.runs - 1),
+    )
+
+
+def _approach(walks: Sequence[TargetWalk], targets: Sequence[Target]) -> Approach:
+    """Where the walk comes nearest to ``targets``."""
+    goals = np.array([target.mean for target in targets])
+    sizes = np.array([[target.standard_error] for target in targets])
+    spreads = np.hypot(np.array([walk.standard_error for walk in walks]), sizes)
+    return approach(
+        [walk.means for walk in walks],
+        goals,
+        np.maximum(spreads, np.maximum(LEAST_SPREAD * np.abs(goals), sys.float_info.min)[:, None]),
+        [target.weight for target in targets],
+        [target.margin for target in targets],
+    )
+
+
+def _notes(screened: ScreeningResult, targets: Sequence[Target]) -> tuple[str, ...]:
     """Which of the directions are those of noise."""
-    in_target = screened.target_analysis.significant()
+    own = (screened.target_analysis, *screened.further_analyses.values())
+    in_target = {name for analysis in own for name in analysis.significant()}
+    whose = "the target's own observable" if len(targets) == 1 else "the observable of any target"
     notes = []
     for chosen in screened.selected:
         if not chosen.reason.startswith(SIGNIFICANT):
             notes.append(f"{chosen.name} is {chosen.reason}; its direction is that of an effect within noise.")
         elif chosen.name not in in_target:
             reason = f"{SIGNIFICANT} in {screened.response}" if chosen.reason == SIGNIFICANT else chosen.reason
-            notes.append(
-                f"{chosen.name} is {reason} but not in the target's own observable, from which the direction is taken."
-            )
+            notes.append(f"{chosen.name} is {reason} but not in {whose}, from which the direction is taken.")
     return tuple(notes)
 
 
@@ -126,10 +237,10 @@ class AscentStage(Stage):
     title = "Steepest ascent"
 
     def planned_runs(self, study: Study, profile: Profile) -> int:
-        """Every step."""
-        return profile.ascent_steps * profile.ascent_replicates
+        """Every step, in every experiment."""
+        return profile.ascent_steps * profile.ascent_replicates * len(study.all_experiments)
 
     def run(self, chain: Chain, runner: Runner) -> AscentResult:
         """See :func:`ascent`."""
-        noise = ended(chain.found.pilot).noise[chain.study.targets[0].observable]
+        noise = ended(chain.found.pilot).noise
         return ascent(chain.study, chain.profile, runner, ended(chain.found.screening), noise)

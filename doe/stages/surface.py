@@ -98,6 +98,9 @@ class OptimumResult(Record):
     def line(self) -> str:
         """One line of what the optimum is."""
         values = ", ".join(f"{path} = {value:.4g}" for path, value in self.values.items())
+        if self.compromise is not None:
+            open_ = any(not estimate.identified for estimate in self.estimates.values())
+            return f"{'chosen by rule: ' if open_ else ''}{values}. {self.compromise.statement}"
         return f"{'chosen by rule: ' if self.single.unidentified else ''}{values}. {self.single.statement}"
 
 

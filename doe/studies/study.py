@@ -370,7 +370,7 @@ def study_from(table: Settings, path: Path) -> Study:
         one_of(target.observable, "target.observable", readings)
     if experiment_of(file.target[0].observable):
         raise StudyFileError(
-            f"target.observable: the first target, {file.target[0].observable}, leads the ascent and has to be of the "
+            f"target.observable: the first target, {file.target[0].observable}, has to be of the "
             f"study's own rig; allowed: {', '.join(given)}"
         )
     for name in experiments:

@@ -62,11 +62,6 @@ def measure(
     if report is not None:
         check_vacant(report, "--report")
     study = target if target is not None and target.suffix == ".toml" and not target.is_dir() else None
-    if target is not None and study is None and checkerboard is not None:
-        raise CommandError(
-            "--target DIR: its pictures are read again without --checkerboard; leave one of the two out, or name a "
-            "STUDY.toml"
-        )
     if study is not None:
         if not study.is_file():
             raise CommandError(f"--target {study}: no such study; `explorer new study NAME` writes one")

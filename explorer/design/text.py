@@ -12,7 +12,8 @@ import numpy as np
 
 from doe.analysis.mixture import bearable_order, mixture_terms
 from doe.analysis.models import Order, bearable, highest_order, terms_of
-from doe.analysis.power import TermPrecision, precision
+from doe.analysis.named_factors import order_of_names, orders_of
+from doe.analysis.power import TermPrecision, precision, precision_of_names
 from doe.analysis.surface import Blocks
 from doe.designs import factor_letters
 from doe.record import plain
@@ -38,8 +39,17 @@ from explorer.report.sections.surface import anova_table, variance_table
 from explorer.tables.text_table import text_table
 from explorer.units import enumeration, number
 
-TERMS = {"factor": "of a factor", "interaction": "of an interaction", "square": "curvature, centre → end"}
+TERMS = {
+    "factor": "of a factor",
+    "name": "between two names",
+    "interaction": "of an interaction",
+    "square": "curvature, centre → end",
+}
 """Kind of a term → the change that it is, in words."""
+OF_NAMES = (
+    "A factor of three names and more is tested by all of them at once (F); the change is that between two of its "
+    "names, the others midway, which is seen least."
+)
 
 
 def check_power(sigma: float | None, effect: float | None) -> None:
@@ -109,6 +119,11 @@ def _many_names(file: FactorsFile) -> bool:
     return any(len(factor.levels) > 2 for factor in file.factors)
 
 
+def _names(file: FactorsFile) -> list[int]:
+    """Number of names per factor, 0 of a number."""
+    return [len(factor.levels) for factor in file.factors]
+
+
 def _range(factor: DesignFactor) -> list[str]:
     return [number(factor.low, 6), number(factor.high, 6), factor.unit or "1"]
 
@@ -137,8 +152,6 @@ def blocks(plan: RunPlan) -> list[str]:
 def _power_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: float | None) -> str:
     if plan.design.mixture:
         return _mixture_text(plan)
-    if _many_names(file):
-        return "What it will see is not told for a factor of three names and more."
     found = planned_power(plan, file, sigma, effect)
     if not found:
         return (
@@ -157,9 +170,10 @@ def _power_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: f
         for one in found
     ]
     table = text_table([*header, f"chance to see {number(effect)}"] if effect else header, rows)
+    names = f"\n{OF_NAMES}" if any(one.df_term > 1 for one in found) else ""
     return (
         f"what the {planned_order(plan, file)} model will see at p < 0.05, in {unit} "
-        f"({found[0].df} degrees of freedom for the error):\n{table}"
+        f"({found[0].df} degrees of freedom for the error):\n{table}{names}"
     )
 
 
@@ -175,13 +189,12 @@ def _mixture_text(plan: RunPlan) -> str:
 
 
 def planned_order(plan: RunPlan, file: FactorsFile) -> Order | None:
-    """The model that the runs bear beside their blocks; None where they leave no error even for the linear one, and
-    with a factor of three names and more.
-    """
-    if _many_names(file):
-        return None
+    """The model that the runs bear beside their blocks; None where they leave no error even for the linear one."""
     letters = factor_letters(plan.coded.shape[1])
     runs, values = plan.coded[plan.sequence[:, 0]], np.zeros((len(plan.sequence), 1))
+    if _many_names(file):
+        found = order_of_names(runs, _names(file), plan.block)
+        return "linear" if found is not None and plan.design.main_effects_only else found
     blocks = None
     if len(plan.block):
         names = tuple(str(number + 1) for number in range(plan.block.max() + 1))
@@ -202,6 +215,10 @@ def planned_power(
     letters = factor_letters(plan.coded.shape[1])
     runs = plan.coded[plan.sequence[:, 0]]
     # Without a sigma everything is counted in it.
+    if _many_names(file):
+        levels = _names(file)
+        terms = orders_of(levels)[order]
+        return precision_of_names(runs, levels, terms, sigma or 1.0, effect or math.nan, block=plan.block)
     return precision(runs, letters, terms_of(letters, order), sigma or 1.0, effect or math.nan, block=plan.block)
 
 

@@ -98,6 +98,8 @@ class PhotographReading:
     photo: str
     """File, or a shipped one's name."""
     ruler: Ruler
+    checkerboard: str | None
+    """File of a picture of one, by the same camera; None: the base line tells the lens."""
     order: MeasureOrder
     measured: MeasuredPhotographs
 
@@ -158,10 +160,13 @@ def rig_result(scene: Scene, rig: str, values: Mapping[str, float | str], seed: 
     return CommandResult(bench_text(data), line, plots, files)
 
 
-def photograph_reading(photo: str, ruler: Ruler) -> PhotographReading:
-    """The one reading of ``photo`` (file, or a shipped one's name). Raises CommandError, or PhotographError."""
-    order = measure_order([photo], ruler.scale_mm, ruler.reference_mm, None, "auto", None, None, None)
-    return PhotographReading(photo, ruler, order, run_measure(order))
+def photograph_reading(photo: str, ruler: Ruler, checkerboard: str | None = None) -> PhotographReading:
+    """The one reading of ``photo`` (file, or a shipped one's name), its lens as the picture ``checkerboard`` tells it.
+
+    Raises CommandError, or PhotographError for what is no picture or no checkerboard.
+    """
+    order = measure_order([photo], ruler.scale_mm, ruler.reference_mm, None, "auto", None, None, None, checkerboard)
+    return PhotographReading(photo, ruler, checkerboard, order, run_measure(order))
 
 
 def photograph_result(read: PhotographReading) -> CommandResult:
@@ -205,7 +210,7 @@ def measure_words(read: PhotographReading) -> list[str]:
     words = ["measure", read.photo]
     for option, length in (("--scale", read.ruler.scale_mm), ("--reference-length", read.ruler.reference_mm)):
         words += [] if length is None else [option, f"{length:g}"]
-    return words
+    return words if read.checkerboard is None else [*words, "--checkerboard", read.checkerboard]
 
 
 def measured_data_result(folder: Path, asked: NewCondition, brought: Brought) -> CommandResult:

@@ -156,7 +156,7 @@ def _board(path: Path, pictures: list[Picture]) -> Board:
     for picture in pictures:
         if abs(picture.width / picture.height / board.shape - 1.0) > SAME_SHAPE:
             raise PhotographError(
-                f"--checkerboard {path}: {board.shape:.2f} times as wide as high, {picture.name} "
+                f"checkerboard {board.name}: {board.shape:.2f} times as wide as high, {picture.name} "
                 f"{picture.width / picture.height:.2f} times; allowed: whole pictures of one camera, held alike"
             )
     return board

@@ -254,14 +254,20 @@ def _designs(result: StudyResult) -> str:
     names = [
         f"{f.name}, {parameter_label(f.path)} {parameter_range(f.path, f.low, f.high)}" for f in result.surface.factors
     ]
+    together = (
+        ", towards where the screening’s first-order models miss all targets least in weighted squares of their "
+        f"standard errors, its steps judged by that and by desirability{citations(('derringer1980',))}"
+        if result.ascent.approach is not None
+        else ""
+    )
     return (
         f"{totals.total} pours ({totals.valid} valid) with seeds drawn from {study.seed} were run: "
         f"{result.pilot.noise[target.observable].runs} of one setting for the noise; a {screening} design of "
         f"{analysis.rows} rows{citations(DESIGNS.get(screening, ()))} over {len(result.screening.factors)} factors; a "
         "walk of "
-        f"steepest ascent{citations(('box1951',))} in {len(result.ascent.means)} steps; and a {surface} design of "
-        f"{len(result.surface.design)} points{citations(DESIGNS.get(surface, ()))} over {enumeration(names)}. "
-        f"{_read(result.pilot.estimator, target.observable)}"
+        f"steepest ascent{citations(('box1951',))} in {len(result.ascent.means)} steps{together}; and a {surface} "
+        f"design of {len(result.surface.design)} points{citations(DESIGNS.get(surface, ()))} over "
+        f"{enumeration(names)}. {_read(result.pilot.estimator, target.observable)}"
     )
 
 

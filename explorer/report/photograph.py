@@ -34,7 +34,7 @@ from explorer.report.figures.style import ASSUMPTION, CHOSEN, FACTOR, TARGET, ax
 from explorer.report.methods import photograph_methods
 from explorer.tables.photograph import BASES, lens_words, thirds_words
 from explorer.units import MISSING, fixed, number
-from solver.photograph import PhotographedPile, Refusal, open_picture
+from solver.photograph import Board, PhotographedPile, Refusal, open_picture
 from solver.photograph.reading_error import COVERAGE
 
 MOST_POINTS = 500
@@ -65,6 +65,8 @@ class ReadPile(Record):
     """Angles of the lower, the middle and the upper third of the fit [°]."""
     lens: float = 0.0
     """k of the lens that was taken out of the picture; 0: none."""
+    checkerboard: str = ""
+    """Name of the picture that told the lens; empty: the base line told it."""
     size: tuple[int, int] = (0, 0)
     """Of the picture [px]: columns, rows."""
     pixel: float = 0.0
@@ -107,7 +109,7 @@ class PhotographResult(Document):
 def photograph_result(measured: MeasuredPhotographs, author: str, notes: str) -> PhotographResult:
     """The record of what was measured."""
     return PhotographResult(
-        piles=tuple(_read(one) for one in measured.readings if isinstance(one, PhotographedPile)),
+        piles=tuple(_read(one, measured.board) for one in measured.readings if isinstance(one, PhotographedPile)),
         refused={one.name: f"{one.reason}: {one.detail}" for one in measured.readings if isinstance(one, Refusal)},
         versions=versions(),
         about=made_today(author, notes),
@@ -278,7 +280,7 @@ def _angles(result: PhotographResult) -> Table:
         "left by thirds",
         "right by thirds",
     )
-    lenses = "".join(f" {pile.name}: {lens_words(pile.lens)}." for pile in result.piles if pile.lens)
+    lenses = "".join(f" {pile.name}: {lens_words(pile.lens, pile.checkerboard)}." for pile in result.piles if pile.lens)
     return Table(
         header,
         tuple(rows),
@@ -328,7 +330,7 @@ def _parts(result: PhotographResult) -> Table:
     return Table(header, rows, "Taken as independent; ± is two standard errors of all together.")
 
 
-def _read(pile: PhotographedPile) -> ReadPile:
+def _read(pile: PhotographedPile, board: Board | None) -> ReadPile:
     step = max(1, -(-pile.outline.u.size // MOST_POINTS))
     left, right, mean = (
         (one.value_deg, COVERAGE * one.error_deg) for one in (pile.angles.left, pile.angles.right, pile.angles.mean)
@@ -347,6 +349,7 @@ def _read(pile: PhotographedPile) -> ReadPile:
         pile.angles.left.thirds_deg,
         pile.angles.right.thirds_deg,
         pile.lens,
+        "" if board is None else board.name,
         size=pile.size,
         pixel=pile.pixel,
         base=(float(ends[0]), float(ends[1])),

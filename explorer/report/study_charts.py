@@ -80,7 +80,9 @@ def _scan(result: AnyStudy) -> Named:
 def _ascent(result: AnyStudy) -> Named:
     if result.ascent is not None:
         caption = "Band: the target, and how far off still counts as met; dotted: what the screening predicted."
-        yield "Ascent path", Plot(partial(ascent_path, result.ascent, result.study.targets[0]), caption)
+        # A result of before there were more walks has one, whatever its targets.
+        for seen, target, of in zip(result.ascent.walks, result.study.targets, _of_targets(result), strict=False):
+            yield f"Ascent path{of}", Plot(partial(ascent_path, result.ascent, seen, target), caption)
 
 
 def _surface(result: AnyStudy) -> Named:

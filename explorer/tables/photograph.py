@@ -85,9 +85,10 @@ def angle_words(value_deg: float, error_deg: float) -> str:
     )
 
 
-def lens_words(k: float) -> str:
-    """What was taken out of a picture that a lens had bent by ``k``."""
-    return f"the lens bends the base line ({'barrel' if k < 0 else 'pincushion'}, k = {signed(k, 3)}): taken out"
+def lens_words(k: float, checkerboard: str = "") -> str:
+    """What was taken out of a picture that a lens had bent by ``k``, as its ``checkerboard`` or its base line tells."""
+    bent = f"the lens bends the {f'checkerboard {checkerboard}' if checkerboard else 'base line'}"
+    return f"{bent} ({'barrel' if k < 0 else 'pincushion'}, k = {signed(k, 3)}): taken out"
 
 
 def _board_words(board: Board) -> str:
@@ -107,8 +108,11 @@ def thirds_words(thirds_deg: Sequence[float | None]) -> str:
 def measure_tables(result: Mapping[str, Any]) -> dict[str, Rows]:
     """What :func:`measure_result` gave, for a place too narrow for one line a picture: picture → its rows."""
     tables: dict[str, Rows] = {}
+    board: Mapping[str, Any] | None = result.get("checkerboard")
     for picture in result["pictures"]:
-        tables[picture["picture"]] = _pile_rows(picture) if picture["pile"] else _refusal_rows(picture)
+        tables[picture["picture"]] = _pile_rows(picture, board) if picture["pile"] else _refusal_rows(picture)
+    if board is not None:
+        tables[f"checkerboard: {board['picture']}"] = _board_rows(board)
     simulation = result["simulation"]
     if simulation is not None:
         means = [picture["angles"]["mean"]["value_deg"] for picture in result["pictures"] if picture["pile"]]
@@ -116,7 +120,17 @@ def measure_tables(result: Mapping[str, Any]) -> dict[str, Rows]:
     return tables
 
 
-def _pile_rows(picture: Mapping[str, Any]) -> Rows:
+def _board_rows(board: Mapping[str, Any]) -> Rows:
+    k, reach = board["lens_k"], COVERAGE * board["error"]
+    kind = "no bend seen" if abs(k) <= reach else "barrel" if k < 0 else "pincushion"
+    return (
+        ("lens k", f"{signed(k, 4)} (95 % {signed(k - reach, 4)} … {signed(k + reach, 4)}): {kind}, taken out"),
+        ("in the corners", f"seen {fixed(100 * abs(k), 1)} % too {'near' if k < 0 else 'far from'} the middle"),
+        ("corners", f"{board['corners']}; they miss a plane board by {fixed(board['miss_px'])} px (RMS)"),
+    )
+
+
+def _pile_rows(picture: Mapping[str, Any], board: Mapping[str, Any] | None) -> Rows:
     unit, base, rough = picture["length_unit"], picture["base_line"], picture["roughness"]
     places = 2 if unit == "mm" else 1
     angles = {name: angle_words(one["value_deg"], one["error_deg"]) for name, one in picture["angles"].items()}
@@ -133,7 +147,7 @@ def _pile_rows(picture: Mapping[str, Any]) -> Rows:
         ("half-width", f"{fixed(picture['half_width'], places)} {unit}"),
         ("roughness", f"{fixed(roughness, places)} {unit}"),
         ("base line", f"{BASES[base['found_by']]}, tilted by {signed(base['tilt_deg'])}°"),
-        *([("lens", lens_words(picture["lens_k"]))] if picture["lens_k"] else []),
+        *([("lens", lens_words(picture["lens_k"]))] if picture["lens_k"] and board is None else []),
     )
 
 

@@ -49,7 +49,9 @@ CASES = {
     "out of reach": (STUDY, PROFILE, FormulaRunner(lambda values: planted(values) - 40.0, sigma=0.5)),
     "one pour per row": (STUDY, QUICK, FormulaRunner(planted, sigma=0.5, jam=0.05)),
     "two targets": (
-        dataclasses.replace(STUDY, targets=(*STUDY.targets, DENSITY)),
+        dataclasses.replace(
+            STUDY, targets=(*STUDY.targets, DENSITY), estimators=(*STUDY.estimators, DENSITY.observable)
+        ),
         PROFILE,
         FormulaRunner(planted, sigma=0.5),
     ),

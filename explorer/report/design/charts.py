@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -13,6 +13,9 @@ from doe.analysis.analyse import FittedModel
 from doe.analysis.model_adequacy import BoxCox, Diagnostics
 from explorer.design.result import DesignResult
 from explorer.report.content import Spec
+from explorer.report.design.elementary import morris_chart
+from explorer.report.design.groups import group_chart
+from explorer.report.design.names import name_chart
 from explorer.report.figures.style import (
     ASSUMPTION,
     CHOSEN,
@@ -42,10 +45,10 @@ DASHES = ("solid", "dash", "dot")
 
 
 def design_plots(result: DesignResult) -> Plots:
-    """Those of a study's surface, then single runs, Box–Cox profile and ridge; none where there is no model."""
+    """Those of a study's surface, then single runs, Box–Cox profile and ridge; without a model those of its kind."""
     model, fitted = result.analysis.model, result.fitted
     if model is None or fitted is None:
-        return {}
+        return dict(_plots_without_model(result))
     plots = dict(surface_plots(fitted))
     if fitted.optimum is not None:
         plots |= optimum_plots(fitted, fitted.optimum)
@@ -57,6 +60,19 @@ def design_plots(result: DesignResult) -> Plots:
     caption = "Highest and lowest response at a distance from the centre, 95 % bands; below: where the highest is."
     plots["Ridge"] = Plot(partial(stacked, ridge(result, model)), caption, 1.6)
     return plots
+
+
+def _plots_without_model(result: DesignResult) -> Iterator[tuple[str, Plot]]:
+    """The chart of elementary effects, names or random groups, as in their sections of the report."""
+    found = result.analysis
+    if found.elementary is not None:
+        caption = "μ*: how much a factor acts, bars 95 %. σ: how much it bends, acts with others, or is noise."
+        yield "Elementary effects", Plot(partial(morris_chart, result, found.elementary), caption)
+    if found.named is not None and found.named.means:
+        yield "Means of names", Plot(partial(name_chart, result, found.named), "Of the model, 95 % intervals (t).")
+    if found.random is not None:
+        caption = "Predicted effects of the groups, shrunk towards zero by their own scatter."
+        yield "Groups", Plot(partial(group_chart, result, found.random), caption)
 
 
 def single_runs(found: Diagnostics, names: Sequence[str]) -> Spec:

@@ -9,13 +9,13 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from doe.analysis.power import TermPrecision, t_test_power
+from doe.analysis.power import TermPrecision
 from doe.designs import DESIGNS, factor_letters
 from doe.provenance import About
 from doe.record import Document
 from explorer.design.factors_file import DesignFactor, FactorsFile, region_of
 from explorer.design.run_plan import BLOCK, COLUMNS, RunPlan, level_text
-from explorer.design.text import TERMS, beyond, blocks, planned_order, planned_power
+from explorer.design.text import OF_NAMES, TERMS, beyond, blocks, planned_order, planned_power
 from explorer.files.run_result import versions
 from explorer.report.content import (
     Banner,
@@ -36,6 +36,7 @@ from explorer.report.figures.style import (
     ASSUMPTION,
     BELOW_TO_ABOVE,
     CHOSEN,
+    DUMMY,
     FACTOR,
     axis,
     chart,
@@ -138,17 +139,22 @@ def _count(result: PlanResult) -> str:
     return "one factor" if n == 1 else f"{n} factors"
 
 
+CHANGES = {"factor": "by a factor (low to high)", "name": "between two names of a factor"}
+"""Kinds of terms that the banner tells of."""
+
+
 def banner(result: PlanResult) -> Banner:
     """How many runs, and the smallest change of a factor that they will see."""
-    seen = next((one for one in result.power if one.kind == "factor" and math.isfinite(one.smallest)), None)
-    if seen is not None:
-        change = number(seen.smallest) if math.isfinite(result.sigma) else f"{number(seen.smallest)} σ"
-        told = "" if math.isfinite(result.sigma) else ", σ the standard deviation of one run"
-        why = f"A change of {change} by a factor, low to high, is seen with a chance of 0.8 at p < 0.05{told}."
+    seen = [one for one in result.power if one.kind in CHANGES and math.isfinite(one.smallest)]
+    if seen:
+        in_sigma = "" if math.isfinite(result.sigma) else " σ"
+        told = ", σ the standard deviation of one run" if in_sigma else ""
+        changes = " and ".join(f"{number(one.smallest)}{in_sigma} {CHANGES[one.kind]}" for one in seen)
+        why = f"A change of {changes} is seen with a chance of 0.8 at p < 0.05{told}."
     elif DESIGNS[result.design].mixture:
         why = "Blends of parts of a whole, for Scheffé’s polynomials."
     else:
-        why = "No chance to see a change is told: nothing is left for an error, or a factor has three names and more."
+        why = "No chance to see a change is told: nothing is left for an error."
     return Banner(
         Word.PLANNED,
         f"{len(result.sequence)} runs of {_count(result)}",
@@ -248,9 +254,13 @@ def _power(result: PlanResult) -> Section:
     )
     header = ("change, low to high", "terms", "standard error", "seen with chance 0.8", "for all at once")
     caption = f"The {result.model} model at p < 0.05, in {unit}; {found[0].df} degrees of freedom for the error."
+    names = any(one.df_term > 1 for one in found)
+    caption += f" {OF_NAMES}" if names else ""
     blocks: tuple[Block, ...] = (
         Figure(
-            "power", power(found, unit), f"{found[0].df} degrees of freedom; noncentral t, p < 0.05, one term alone."
+            "power",
+            power(found, unit),
+            f"{found[0].df} degrees of freedom; noncentral {'t and F' if names else 't'}, p < 0.05, one term alone.",
         ),
         Table((*header, *([asked] if asked else [])), rows, caption),
     )
@@ -265,11 +275,11 @@ def power(found: list[TermPrecision], unit: str) -> Spec:
             "type": "scatter",
             "mode": "lines",
             "x": changes.tolist(),
-            "y": [t_test_power(float(change), one.standard_error, one.df) for change in changes],
+            "y": [one.chance(float(change)) for change in changes],
             "name": TERMS[one.kind],
             "line": line(colour, width=2),
         }
-        for one, colour in zip(found, (FACTOR, ASSUMPTION, CHOSEN), strict=False)
+        for one, colour in zip(found, (FACTOR, ASSUMPTION, CHOSEN, DUMMY), strict=False)
     ]
     layout = {
         "xaxis": axis(f"change of the response [{unit}]", rangemode="tozero"),

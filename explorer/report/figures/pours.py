@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from doe.analysis.pilot import EstimatorChoice
 from doe.provenance import PouredPile
 from doe.run_records import Run, valid_values
-from doe.stages.ascent import AscentResult
+from doe.stages.ascent import AscentResult, TargetWalk
 from doe.stages.pilot import PilotResult
 from doe.stages.scan import ScanResult
 from doe.stages.verification import VerificationResult
@@ -151,10 +151,13 @@ MEASURED = 1.0
 SIMULATED = 2.0
 
 
-def ascent_path(walk: AscentResult, target: Target) -> Spec:
-    """Mean per step with its 95 % interval, single runs, the first-order prediction, and the target with margin."""
-    unit = unit_of_observable(walk.observable)
-    steps = list(range(1, len(walk.means) + 1))
+def ascent_path(walk: AscentResult, seen: TargetWalk, target: Target) -> Spec:
+    """Mean per step with its 95 % interval, single runs, the first-order prediction, and the target with margin.
+
+    ``seen``: what ``walk`` gave in the observable of ``target``.
+    """
+    unit = unit_of_observable(seen.observable)
+    steps = list(range(1, len(seen.means) + 1))
     settings = [
         "<br>".join(
             label(f"{factor.name} = {parameter_value(factor.path, value)}")
@@ -162,18 +165,18 @@ def ascent_path(walk: AscentResult, target: Target) -> Spec:
         )
         for natural in walk.path.natural.tolist()
     ]
-    means = finite(unit.of(mean) for mean in walk.means)
-    widths = [NORMAL_95 * unit.of(error) for error in walk.standard_error.tolist()]
+    means = finite(unit.of(mean) for mean in seen.means)
+    widths = [NORMAL_95 * unit.of(error) for error in seen.standard_error.tolist()]
     traces = [
         {
             "type": "scatter",
             "mode": "lines",
             "x": steps,
-            "y": [unit.of(value) for value in walk.path.predicted.tolist()],
+            "y": [unit.of(value) for value in seen.predicted.tolist()],
             "name": "first-order prediction of the screening",
             "line": line(DUMMY, "dot"),
         },
-        _single_runs(steps, walk.runs, walk.observable, FACTOR),
+        _single_runs(steps, walk.runs, seen.observable, FACTOR),
         points(
             steps,
             means,
@@ -186,7 +189,7 @@ def ascent_path(walk: AscentResult, target: Target) -> Spec:
             hovertemplate="step %{x}: %{y:.2f}<br>%{text}<extra></extra>",
         ),
     ]
-    layout = {"xaxis": axis("step", dtick=1), "yaxis": axis(observable_title(walk.observable))}
+    layout = {"xaxis": axis("step", dtick=1), "yaxis": axis(observable_title(seen.observable))}
     return chart(traces, layout | _target_marks(target), 400)
 
 

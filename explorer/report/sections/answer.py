@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from doe.analysis.screening import SIGNIFICANT
 from doe.analysis.t_tests import Sample
 from doe.analysis.verification import Verification
 from doe.stages.screening import ScreeningResult
+from doe.stages.surface import CONTRADICTION
 from doe.stages.verification import VerificationResult
 from doe.studies.factors import MIN_BODIES
 from doe.studies.study_result import StudyResult, valid_runs
@@ -35,45 +37,51 @@ from explorer.units import (
 
 def banner(result: StudyResult) -> Banner:
     """Whether the material is calibrated: fresh pours decide, and a surface that is mere noise decides nothing."""
-    single, tests = result.optimum.single, result.verification.tests
+    single, targets, tests = result.optimum.single, result.study.targets, result.verification.tests
     verdicts = {one.verdict for one in tests}
-    # Of several targets the one speaks that is missed, else the first that stays open, else the first.
-    telling = next((word for word in ("different", "cannot tell") if word in verdicts), "equivalent")
-    index = next((k for k, one in enumerate(tests) if one.verdict == telling), 0)
-    target, test = result.study.targets[index], tests[index]
-    name = target.observable
-    of = f" of the {observable_label(name)}" if len(tests) > 1 else ""
-    poured = (
-        f"{test.simulated.n} fresh pours at the chosen setting gave {observed(name, test.simulated.mean)} against "
-        f"{observed(name, target.mean)} measured{of}"
-    )
-    ends = (observed(result.study.targets[0].observable, end) for end in (single.reachable_low, single.reachable_high))
+    poured, said = _poured(targets, tests), _said(targets, tests)
+    shown = (single.better_than_noise, *(anova.better_than_noise for anova in result.surface.anova[1:]))
+    noisy = [one for one, good in zip(targets, shown, strict=True) if not good]
+    ends = (observed(targets[0].observable, end) for end in (single.reachable_low, single.reachable_high))
     reach = " … ".join(ends)
     if not single.reached and verdicts != {"equivalent"}:
-        first = result.study.targets[0].observable
+        first = targets[0].observable
+        named = f" ({observable_label(first)})" if len(targets) > 1 else ""
         return Banner(
             Word.OUT_OF_REACH,
             "",
-            f"No setting of the region gives {observed(first, single.target)}: the model reaches {reach}, and "
+            f"No setting of the region gives {observed(first, single.target)}{named}: the model reaches {reach}, and "
             f"{poured}.",
             "Widen the ranges of the factors that act, or add a factor that is missing: for round bodies rolling "
             "resistance, `effect.rolling_resistance.rolling_friction`.",
         )
-    if not single.better_than_noise:
+    joint = result.optimum.posterior
+    if len(targets) > 1 and joint is not None and joint.p < CONTRADICTION and verdicts != {"equivalent"}:
+        return Banner(
+            Word.OUT_OF_REACH,
+            "",
+            f"No setting of the region gives all targets at once (χ², p = {p_value(joint.p)}), and {poured}.",
+            "Look at how each target was measured, widen the ranges of the factors that act, or ask "
+            "`explorer diagnose` whether the model lacks an effect.",
+        )
+    if noisy:
+        of = f" of the {enumeration([observable_label(one.observable) for one in noisy])}" if len(targets) > 1 else ""
+        sigmas = enumeration([observed(one.observable, result.pilot.noise[one.observable].sigma) for one in noisy])
         return Banner(
             Word.NOT_CALIBRATED,
             "",
-            f"The response surface is not better than noise, so the chosen point is no calibration, although {poured}."
+            f"The response surface{of} is not better than noise, so the chosen point is no calibration, although "
+            f"{poured}."
             if verdicts == {"equivalent"}
-            else f"The response surface is not better than noise, and {poured}.",
+            else f"The response surface{of} is not better than noise, and {poured}.",
             "Pour more replicates per point, or widen the ranges until the factors show above the noise of one pour, "
-            f"σ = {observed(name, result.pilot.noise[name].sigma)}.",
+            f"σ = {sigmas}.",
         )
     if "different" in verdicts:
         return Banner(
             Word.NOT_CALIBRATED,
             "",
-            f"{poured[0].upper()}{poured[1:]}: {verdict(target, test)}",
+            f"{poured}: {said}",
             "Start again around the point found, with narrower ranges; if it stays, ask `explorer diagnose` whether "
             "the model lacks an effect.",
         )
@@ -81,20 +89,41 @@ def banner(result: StudyResult) -> Banner:
         return Banner(
             Word.NO_ANSWER,
             "",
-            f"{poured[0].upper()}{poured[1:]}: {verdict(target, test)}",
-            f"Pour more than {test.simulated.n} times in the verification, or state a margin that this noise can show.",
+            f"{poured}: {said}",
+            f"Pour more than {max(one.simulated.n for one in tests)} times in the verification, or state a margin that "
+            "this noise can show.",
         )
     margins = " and ".join(f"± {observed(one.observable, one.margin)}" for one in result.study.targets)
     open_ = [one.name for one in settings(result.optimum) if not one.identified]
     return Banner(
         Word.CALIBRATED,
         margins,
-        f"{poured[0].upper()}{poured[1:]}: {verdict(target, test)}",
+        f"{poured}: {said}",
         f"Take the ranges of {enumeration(open_)} as the answer, and add a second measurement (another rig or "
         "observable) to fix them."
         if open_
         else "Use these values, and check them on a test that was not fitted.",
     )
+
+
+def _poured(targets: Sequence[Target], tests: Sequence[Verification]) -> str:
+    """What the fresh pours gave beside what was measured, of every target."""
+    pairs = [
+        f"{observed(one.observable, test.simulated.mean)} against {observed(one.observable, one.mean)} measured"
+        for one, test in zip(targets, tests, strict=True)
+    ]
+    if len(pairs) > 1:
+        pairs = [f"{pair} ({observable_label(one.observable)})" for pair, one in zip(pairs, targets, strict=True)]
+    pours = enumeration([str(n) for n in sorted({test.simulated.n for test in tests})])
+    return f"{pours} fresh pours at the chosen setting gave {enumeration(pairs)}"
+
+
+def _said(targets: Sequence[Target], tests: Sequence[Verification]) -> str:
+    """The verdict on one target, or in short on each of several."""
+    if len(targets) == 1:
+        return verdict(targets[0], tests[0])
+    pairs = zip(targets, tests, strict=True)
+    return "; ".join(f"{_outcome(one, test)} ({observable_label(one.observable)})" for one, test in pairs) + "."
 
 
 ANSWER = 3
@@ -146,10 +175,13 @@ def cautions(result: StudyResult) -> list[str]:
     if missing:
         rows = enumeration([str(row + 1) for row in missing])
         found.append(f"Screening row {rows} has no valid pour and is analysed as missing.")
-    if not result.ascent.bracket.reached:
+    walk = result.ascent
+    if walk.approach is not None and not walk.approach.reached:
+        found.append("The steepest ascent did not meet all targets; the surface stands over the whole of the ranges.")
+    elif walk.approach is None and not walk.bracket.reached:
         found.append("The steepest ascent did not pass the target; the surface stands around its nearest step.")
     optimum = result.optimum.single
-    if not optimum.better_than_noise:
+    if len(result.study.targets) == 1 and not optimum.better_than_noise:
         found.append("The response surface is not better than noise: the optimum is a point, not a calibration.")
     observable = result.study.targets[0].observable
     if not optimum.reached:
@@ -158,7 +190,7 @@ def cautions(result: StudyResult) -> list[str]:
             f"{observed(observable, optimum.reachable_low)} … {observed(observable, optimum.reachable_high)}; "
             "the optimum is where it comes nearest."
         )
-    elif optimum.unidentified:
+    elif len(result.study.targets) == 1 and optimum.unidentified:
         found.append(
             f"One number cannot fix several parameters: {enumeration(optimum.unidentified)} can take at least half "
             "of the region while the model stays at the target."
@@ -189,12 +221,13 @@ def precision_cautions(target: Target, test: Verification) -> list[str]:
 
 def _facts(result: StudyResult) -> list[tuple[str, str]]:
     study, profile, totals = result.study, result.study.profile, result.runs
-    observable = study.targets[0].observable
-    noise, test, analysis = result.pilot.noise[observable], result.verification.tests[0], result.screening.analysis
+    analysis = result.screening.analysis
     chosen = [
         f"{one.name} ({one.label})" + (f" = {one.chosen}" if one.identified else f": {one.answer}")
         for one in settings(result.optimum)
     ]
+    several = len(study.targets) > 1
+    named = [(target, f" ({observable_label(target.observable)})" if several else "") for target in study.targets]
     outcomes = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in sorted(totals.by_outcome.items()))
     return [
         (
@@ -202,22 +235,32 @@ def _facts(result: StudyResult) -> list[tuple[str, str]]:
             f"{code(study.name)}, profile {profile.name}: {number(1e3 * profile.mass)} g, {profile.spheres} shapes",
         ),
         ("Runs", f"{totals.total} pours: {outcomes}; {percent(1 - totals.valid / totals.total, 1)} not valid"),
-        (
-            "Noise of one pour",
-            f"σ = {observed(observable, noise.sigma)} (95 % interval {observed(observable, noise.low)} … "
-            f"{observed(observable, noise.high)}, {noise.runs} seeds; {observable_label(observable)})",
-        ),
+        *((f"Noise of one pour{of}", _noise(result, target)) for target, of in named),
         ("Significant factors", f"{enumeration(analysis.significant())} (Holm, against the {analysis.error_source})"),
         ("Largest unknown", assumption_statement(result)),
         ("Optimum", "; ".join(chosen) if holds(result) else Struck("; ".join(chosen))),
-        (
-            "Verification",
-            f"{observed(observable, test.simulated.mean)} over {test.simulated.n} fresh pours against "
-            f"{observed(observable, test.target.mean)}: {test.verdict}; "
-            f"relative error {fixed(test.relative_error_percent)} %",
+        *(
+            (f"Verification{of}", _verified(target, test))
+            for (target, of), test in zip(named, result.verification.tests, strict=True)
         ),
         ("Time", duration(result.timing.total_s)),
     ]
+
+
+def _noise(result: StudyResult, target: Target) -> str:
+    name, noise = target.observable, result.pilot.noise[target.observable]
+    return (
+        f"σ = {observed(name, noise.sigma)} (95 % interval {observed(name, noise.low)} … {observed(name, noise.high)}, "
+        f"{noise.runs} seeds; {observable_label(name)})"
+    )
+
+
+def _verified(target: Target, test: Verification) -> str:
+    name = target.observable
+    return (
+        f"{observed(name, test.simulated.mean)} over {test.simulated.n} fresh pours against "
+        f"{observed(name, test.target.mean)}: {test.verdict}; relative error {fixed(test.relative_error_percent)} %"
+    )
 
 
 def assumption_statement(result: StudyResult) -> str:
@@ -324,18 +367,21 @@ def _of_target(stage: VerificationResult, index: int, target: Target, test: Veri
 
 def verdict(target: Target, test: Verification) -> str:
     """The outcome in one sentence, the equivalence test first: no difference found is no proof of agreement."""
-    name = target.observable
-    margin = observed(name, target.margin)
-    deciding = test.deciding
-    words = {
-        "equivalent": f"equivalent to the measurement within ± {margin}.",
-        "different": f"different from the measurement, and not shown to lie within ± {margin}.",
-        "cannot tell": f"neither different nor shown to lie within ± {margin}; more pours are needed to tell.",
-    }[test.verdict]
+    name, deciding = target.observable, test.deciding
+    words = f"{_outcome(target, test)}{'; more pours are needed to tell' if test.verdict == 'cannot tell' else ''}."
     if deciding is None or math.isnan(deciding.low):
         return words
     interval = f"{_difference(name, deciding.low)} … {_difference(name, deciding.high)}"
     return f"{words} Difference {_difference(name, deciding.difference)}, 95 % interval {interval}."
+
+
+def _outcome(target: Target, test: Verification) -> str:
+    margin = observed(target.observable, target.margin)
+    return {
+        "equivalent": f"equivalent to the measurement within ± {margin}",
+        "different": f"different from the measurement, and not shown to lie within ± {margin}",
+        "cannot tell": f"neither different nor shown to lie within ± {margin}",
+    }[test.verdict]
 
 
 def _samples(target: Target, test: Verification) -> Table:

@@ -9,10 +9,11 @@ import numpy as np
 
 from doe.analysis.canonical import Canonical
 from doe.analysis.named_factors import NameGroup
+from doe.analysis.steepest_ascent import Approach
 from doe.analysis.surface import Surface
 from doe.analysis.surface_anova import AnovaRow, SurfaceAnova
 from doe.run_records import sample_of, valid_values
-from doe.stages.ascent import AscentResult
+from doe.stages.ascent import AscentResult, TargetWalk
 from doe.stages.surface import SurfaceResult
 from doe.studies.study import Factor
 from doe.studies.study_result import StudyResult
@@ -21,6 +22,7 @@ from explorer.report.figures.model import FittedTarget, fitted_targets
 from explorer.report.figures.pours import ascent_path
 from explorer.report.figures.surface import contours, fit
 from explorer.units import (
+    enumeration,
     fixed,
     number,
     observable_label,
@@ -30,6 +32,7 @@ from explorer.units import (
     parameter_range,
     parameter_value,
     percent,
+    signed,
     unit_of_observable,
     unit_of_parameter,
 )
@@ -38,31 +41,58 @@ from explorer.units import (
 def ascent(result: StudyResult) -> Section:
     """Steps, means, errors and the bracket."""
     walk = result.ascent
-    observable = walk.observable
-    blocks: list[Block] = [
-        Text(
-            "Direction and steps follow the effects on the target's own observable; base factor "
-            f"{walk.path.base}. {walk.bracket.statement} Two steps have to differ by "
-            f"{observed(observable, walk.smallest_difference)} to be told apart with chance 0.8."
-        ),
-        Figure(
-            "ascent",
-            ascent_path(walk, result.study.targets[0]),
-            f"n = {sum(len(valid_values(runs, observable)) for runs in walk.runs)} valid pours, one faint point each; "
-            "means "
-            "with 95 % intervals (z) from the pilot’s σ and the number of valid pours of a step; band: the target and "
-            "its margin.",
-        ),
-        _steps(walk),
-    ]
+    seen = enumeration([observed(one.observable, one.smallest_difference) for one in walk.walks])
+    apart = f"Two steps have to differ by {seen} to be told apart with chance 0.8."
+    if walk.approach is None:
+        direction = "Direction and steps follow the effects on the target's own observable; base factor"
+        blocks: list[Block] = [Text(f"{direction} {walk.path.base}. {walk.bracket.statement} {apart}")]
+    else:
+        labels = [observable_label(one.observable) for one in walk.walks]
+        blocks = [
+            Text(
+                "The walk leads from the centre to where the screening's first-order models miss all targets "
+                f"({enumeration(labels)}) least, in the weighted squares of their standard errors by which the optimum "
+                f"is chosen; base factor {walk.path.base}. {walk.approach.words(labels)} {apart}"
+            )
+        ]
+    for place, (one, target) in enumerate(zip(walk.walks, result.study.targets, strict=False), start=1):
+        blocks += [
+            Figure(
+                "ascent" if place == 1 else f"ascent-{place}",
+                ascent_path(walk, one, target),
+                f"n = {sum(len(valid_values(runs, one.observable)) for runs in walk.runs)} valid pours, one faint "
+                "point each; means with 95 % intervals (z) from the pilot’s σ and the number of valid pours of a step; "
+                "band: the target and its margin.",
+            ),
+            _steps(walk, one),
+        ]
+    if walk.approach is not None:
+        blocks.append(_joint_steps(walk, walk.approach))
     notes = (*walk.notes, *(f"Region of the surface, SI units: {note}" for note in walk.region.notes))
     if notes:
         blocks.append(Bullets(notes))
     return Section("Steepest ascent", tuple(blocks))
 
 
-def _steps(walk: AscentResult) -> Table:
-    observable, factors = walk.observable, walk.factors
+def _joint_steps(walk: AscentResult, found: Approach) -> Table:
+    """How far every step misses the targets together."""
+    labels = [f"{observable_label(one.observable)} [standard errors]" for one in walk.walks]
+    rows = tuple(
+        (str(k + 1), *(signed(missed) for missed in misses), fixed(misfit), fixed(desirable))
+        for k, (misses, misfit, desirable) in enumerate(
+            zip(found.standardised.T.tolist(), found.misfit.tolist(), found.desirability.tolist(), strict=True)
+        )
+    )
+    caption = (
+        "All targets: by how many standard errors of mean and target together a step misses them; misfit: their "
+        "squares by weight; desirability: 1 at every target, 0 where one is off by its margin (geometric mean by "
+        "weight)."
+    )
+    return Table(("step", *labels, "misfit J", "desirability"), rows, caption)
+
+
+def _steps(walk: AscentResult, seen: TargetWalk) -> Table:
+    observable, factors = seen.observable, walk.factors
     rows = []
     for k, natural in enumerate(walk.path.natural.tolist()):
         rows.append(
@@ -70,10 +100,10 @@ def _steps(walk: AscentResult) -> Table:
                 str(k + 1),
                 *(parameter_value(f.path, value) for f, value in zip(factors, natural, strict=True)),
                 str(len(valid_values(walk.runs[k], observable))),
-                observed(observable, walk.means[k]),
-                observed(observable, walk.sd[k]),
-                observed(observable, walk.standard_error[k]),
-                fixed(walk.relative_error_percent[k]),
+                observed(observable, seen.means[k]),
+                observed(observable, seen.sd[k]),
+                observed(observable, seen.standard_error[k]),
+                fixed(seen.relative_error_percent[k]),
             )
         )
     header = (

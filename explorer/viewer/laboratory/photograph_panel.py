@@ -30,11 +30,12 @@ NO_RULER = (
     "Give the length of a pixel, or of a straight bar in the picture; without either, lengths stay in pixels. Angles "
     "need neither."
 )
+NO_BOARD = "none: the base line tells the lens"
 OWN = "The study's target is that of its file. What is read off a photograph can take its place."
 
 
 class PhotographPanel(Panel):
-    """Picture, scale, answer, target; uploads are kept, and the pours that pictures are compared with."""
+    """Picture, scale, lens, answer, target; uploads are kept, and the pours that pictures are compared with."""
 
     name, tab, title, every = "photograph", LABORATORY, "Photograph → angle of repose", SELDOM
 
@@ -58,6 +59,15 @@ class PhotographPanel(Panel):
             max=10_000.0,
             step=0.1,
             hint="Length of the one straight bar in the picture, in place of the scale; 0: there is none.",
+        )
+        self._board = UploadSlot(
+            server,
+            "Checkerboard",
+            (NO_BOARD,),
+            PICTURES,
+            folder,
+            post,
+            "A printed one, by the same camera at the same distance: its corners tell how far the lens bends pictures.",
         )
         self._given = Ruler()
         self._follow(examples[0])
@@ -120,9 +130,10 @@ class PhotographPanel(Panel):
     def _answer(self, what: str, result_of: Callable[[PhotographReading], CommandResult]) -> None:
         """Read the photograph, and show what comes of it; the reading stays for the target."""
         photo, ruler = self._photo.chosen, self._ruler()
+        board = None if self._board.chosen == NO_BOARD else self._board.chosen
 
         def find() -> tuple[PhotographReading, CommandResult]:
-            read = photograph_reading(photo, ruler)
+            read = photograph_reading(photo, ruler, board)
             return read, result_of(read)
 
         def done(found: tuple[PhotographReading, CommandResult]) -> None:

@@ -1,11 +1,22 @@
 """Steepest ascent: direction, clipping, bracket and the box around it."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import minimize_scalar
 
-from doe.analysis.steepest_ascent import AscentFactor, ascent_path, bracket, region_around
+from doe.analysis.steepest_ascent import (
+    AscentFactor,
+    FirstOrder,
+    approach,
+    ascent_path,
+    bracket,
+    joint_path,
+    region_around,
+)
 from doe.errors import StatisticsError
 
 FACTORS = (
@@ -124,6 +135,95 @@ def test_a_shifted_centre_is_noted():
 def test_bad_input_is_named(factors, options, message):
     with pytest.raises(StatisticsError, match=message):
         ascent_path(factors, 24.0, **options)
+
+
+LOW, HIGH = [0.0, 10.0], [1.0, 30.0]
+NAMES = ("a", "b")
+
+
+def first_order(mean, slopes, goal, spread=1e-3, weight=1.0):
+    """The model of a target by its slopes per half range."""
+    return FirstOrder(mean, 2.0 * np.array(slopes), goal, spread, weight)
+
+
+def test_several_targets_are_walked_to_together():
+    # 20 + 2a + 2b = 21 and 40 + a - 3b = 42.5 at a = 1, b = -0.5. Along the first one's effects, (1, 1), the second
+    # falls by 2 where it has to rise.
+    models = [first_order(20.0, [2.0, 2.0], 21.0), first_order(40.0, [1.0, -3.0], 42.5)]
+    path = joint_path(NAMES, LOW, HIGH, models, steps=5)
+    assert path.direction == pytest.approx([1.0, -0.5], abs=1e-5)
+    assert path.natural[-1] == pytest.approx([1.0, 15.0], abs=1e-4)
+    assert path.predicted == pytest.approx([19.0, 19.5, 20.0, 20.5, 21.0], abs=1e-4)
+    alone = ascent_path([AscentFactor("a", 0.0, 1.0, 4.0), AscentFactor("b", 10.0, 30.0, 4.0)], 20.0, steps=5)
+    assert alone.direction == pytest.approx([1.0, 1.0])
+    assert 40.0 + alone.coded[-1] @ [1.0, -3.0] == pytest.approx(38.0)
+
+
+@pytest.mark.parametrize(("goal", "sign"), [(23.0, 1.0), (17.0, -1.0)])
+def test_towards_one_target_it_is_the_walk_of_steepest_ascent(goal, sign):
+    path = joint_path(NAMES, LOW, HIGH, [first_order(20.0, [1.0, -3.0], goal, spread=0.7)], steps=5)
+    alone = ascent_path([AscentFactor("a", 0.0, 1.0, 2.0), AscentFactor("b", 10.0, 30.0, -6.0)], 20.0, steps=5)
+    assert path.direction == pytest.approx(sign * alone.direction)
+
+
+def test_the_misfit_of_the_first_order_models_falls_towards_the_end_of_the_walk():
+    models = [
+        first_order(20.0, [2.0, 1.0, 0.5], 22.0, spread=0.5),
+        first_order(40.0, [1.0, -3.0, 0.2], 39.0, spread=1.5, weight=2.0),
+        first_order(5.0, [0.1, 0.3, -0.4], 5.2, spread=0.2),
+    ]
+    path = joint_path("abc", [-1.0] * 3, [1.0] * 3, models, steps=3)
+
+    def misfit(x):
+        return sum(m.weight * ((m.mean + m.effects @ x / 2 - m.goal) / m.spread) ** 2 for m in models) + x @ x
+
+    # x* lies on the walk, and J is least there: no direction leads down from it.
+    share = minimize_scalar(lambda a: misfit(a * path.direction)).x
+    at = share * path.direction
+    assert share > 0
+    for step in np.vstack([np.eye(3), -np.eye(3)]) * 1e-3:
+        assert misfit(at + step) > misfit(at)
+
+
+def test_what_is_within_noise_turns_the_walk_little():
+    # The same slopes but for 0.1, and misses that 0.1 would have to explain: without damping a = -49, b = 50.
+    models = [first_order(20.0, [1.0, 1.0], 21.0, spread=1.0), first_order(40.0, [1.1, 1.0], 36.1, spread=1.0)]
+    path = joint_path(NAMES, [-1.0, -1.0], [1.0, 1.0], models)
+    assert path.direction[0] == pytest.approx(-1.0)
+    assert path.direction[1] < -0.5
+
+
+def test_the_walk_comes_nearest_to_all_targets_between_its_steps():
+    steps = np.arange(6.0)
+    # The first is met at step index 2.5, the second at 3.5, both with a slope of one standard error a step.
+    means, goals = np.array([10.0 + steps, 50.0 - 2.0 * steps]), [12.5, 43.0]
+    spreads = np.array([np.ones(6), 2.0 * np.ones(6)])
+
+    def found(*weights):
+        return approach(means, goals, spreads, weights, [2.0, 4.0])
+
+    even = found(1.0, 1.0)
+    assert even.position == pytest.approx(3.0)
+    assert even.missed == pytest.approx([0.5, 0.5])
+    assert even.misfit == pytest.approx((steps - 2.5) ** 2 + (steps - 3.5) ** 2)
+    assert even.desirability[3] == pytest.approx(np.sqrt(0.75 * 0.75))
+    assert even.desirability[0] == 0.0
+    assert (even.reached, even.resolved) == (True, True)
+    heavy = found(3.0, 1.0)
+    assert heavy.position == pytest.approx(2.75)
+    assert heavy.desirability[3] == pytest.approx(0.75)
+    # A step at which one target has no run is passed over; noise of four times the size tells no place.
+    means[1, 3] = np.nan
+    assert found(1.0, 1.0).position == pytest.approx(3.0)
+    spreads *= 4.0
+    assert (found(1.0, 1.0).reached, found(1.0, 1.0).resolved) == (True, False)
+    means[1] += 40.0
+    far = found(1.0, 1.0)
+    assert not far.reached
+    assert re.search(r"by at most \S+ standard errors \(y\)\. The path does not meet", far.words(("x", "y")))
+    means[1] = np.nan
+    with pytest.raises(StatisticsError, match="for every target"):
+        found(1.0, 1.0)
 
 
 def test_bracket_and_region_refuse_nonsense():

@@ -249,9 +249,11 @@ def test_the_share_without_a_pile_counts_every_failure(study):
 
 def test_two_targets_are_weighed_against_each_other(study):
     density = Target("bulk_density_kg_m3", mean=150.0 + 5.0 * 24.68, sd=2.0, n=10)
-    both = dataclasses.replace(study, targets=(*study.targets, density))
+    names = (*study.estimators, density.observable)
+    both = dataclasses.replace(study, targets=(*study.targets, density), estimators=names)
     result = run_campaign(both, PROFILE, FormulaRunner(planted, sigma=0.5), BIAS).stages
     compromise = result.optimum.compromise
+    assert compromise.statement in result.optimum.line
     assert np.abs(compromise.standardised).max() < 1.0  # the two targets agree in the planted truth
     assert len(result.verification.tests) == 2
     assert compromise.desirability == pytest.approx([1.0, 1.0], abs=0.05)

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from doe.analysis.steepest_ascent import AscentFactor, ascent_path, bracket, region_around
 from doe.errors import StudyFileError
 from doe.stages import planned_runs
 from doe.studies.campaign import run_campaign
@@ -131,7 +132,8 @@ def test_every_stage_makes_its_planned_runs_in_every_experiment(both):
     for stage in ("screening", "surface", "verification"):
         assert counts[stage, ""] == counts[stage, "drum"] > 0
     assert counts["pilot", "drum"] == PROFILE.pilot_runs
-    assert counts["ascent", "drum"] == counts["scan", "drum"] == 0
+    assert counts["ascent", "drum"] == counts["ascent", ""] > 0
+    assert counts["scan", "drum"] == 0
     planned = planned_runs(of_truth(), PROFILE)
     assert {stage: counts[stage, ""] + counts[stage, "drum"] for stage in planned} == planned
 
@@ -157,10 +159,59 @@ def test_two_targets_identify_what_one_leaves_open(both):
     )
 
 
-def test_the_region_of_several_experiments_is_the_whole_of_the_ranges(both):
+def test_the_walk_leads_to_where_all_targets_are_met(both):
+    walk = both.ascent
+    names = [factor.path for factor in walk.factors]
+    # The first target alone asks for more of both factors in equal parts. The drum's angle falls by that, and has to
+    # rise.
+    centre, along = ({path: CENTRES[path][0] + share * CENTRES[path][1] for path in TRUTH} for share in (0.0, 0.5))
+    assert drum(along) < drum(centre) < drum(TRUTH)
+    direction = dict(zip(names, walk.path.direction.tolist(), strict=True))
+    assert direction[FRICTION] == pytest.approx(1.0)
+    assert direction[MODULUS] == pytest.approx(coded(TRUTH, MODULUS) / coded(TRUTH, FRICTION), abs=0.15)
+    assert (walk.approach.reached, walk.approach.resolved) == (True, True)
+    assert [one.observable for one in walk.walks] == ["angle_of_repose_deg", "drum/dynamic_angle_deg"]
+    place = np.array([np.interp(walk.approach.position, range(len(walk.means)), one) for one in walk.path.natural.T])
+    for path, at in zip(names, place.tolist(), strict=True):
+        if path in TRUTH:
+            assert coded({path: at}, path) == pytest.approx(coded(TRUTH, path), abs=0.15)
+    assert walk.line.startswith("All 2 targets together are missed least at step ")
+    # The surface stands around that place, and no longer over the whole of the ranges.
     region = both.surface.region
     for factor, centre, half in zip(both.surface.factors, region.centre, region.half_width, strict=True):
+        assert half < 0.3 * (factor.high - factor.low)
+        if factor.path in TRUTH:
+            assert centre - half < TRUTH[factor.path] < centre + half
+    assert walk.path.predicted == pytest.approx(
+        [repose(dict(zip(names, one, strict=True))) for one in walk.path.natural.tolist()], abs=0.5
+    )
+    assert walk.others[0].predicted == pytest.approx(
+        [drum(dict(zip(names, one, strict=True))) for one in walk.path.natural.tolist()], abs=0.5
+    )
+
+
+def test_a_walk_that_meets_not_all_targets_leaves_the_whole_of_the_ranges():
+    found = campaign(of_truth(off=15.0))
+    assert not found.ascent.approach.reached
+    assert "does not meet all of them" in found.ascent.line
+    region = found.surface.region
+    for factor, centre, half in zip(found.surface.factors, region.centre, region.half_width, strict=True):
         assert (centre - half, centre + half) == pytest.approx((factor.low, factor.high))
+
+
+def test_one_target_is_walked_to_along_its_own_effects():
+    found = campaign(of_truth(both=False))
+    walk, own = found.ascent, found.screening.target_analysis
+    effects = {effect.name: effect.effect for effect in own.effects}
+    factors = [AscentFactor(f.name, float(f.low), float(f.high), effects[f.name]) for f in walk.factors]
+    path = ascent_path(factors, own.mean, steps=PROFILE.ascent_steps)
+    target = of_truth().targets[0]
+    met = bracket(walk.means, target.mean, standard_errors=walk.standard_error)
+    # To the last bit.
+    assert walk.path.to_dict() == path.to_dict()
+    assert walk.bracket.to_dict() == met.to_dict()
+    assert walk.region.to_dict() == region_around(path, met).to_dict()
+    assert (walk.others, walk.approach) == ((), None)
 
 
 def test_targets_that_contradict_each_other_are_told():
@@ -179,7 +230,9 @@ def test_a_factor_that_acts_on_the_second_target_alone_is_selected(both):
     found = run_campaign(one, PROFILE, runner, dict.fromkeys(one.estimators, ((0.0, 0.1),) * 3)).stages
     reasons = {chosen.name: chosen.reason for chosen in found.screening.selected}
     assert reasons["X16"] == "significant in drum/dynamic_angle_deg"
-    assert any("X16 is significant in drum/dynamic_angle_deg but not in" in note for note in found.ascent.notes)
+    # The walk heeds that target, so that its direction is none of noise.
+    assert not any("X16" in note for note in found.ascent.notes)
+    assert any("X16" in note for note in both.ascent.notes)
     # Where it acts nowhere it comes from the fallback list.
     assert {chosen.name: chosen.reason for chosen in both.screening.selected}["X16"] == "fallback: not significant"
 

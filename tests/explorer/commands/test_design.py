@@ -266,8 +266,15 @@ def test_a_factor_of_two_names_is_analysed_by_its_name(tmp_path, process):
 
 def test_a_factor_of_three_names_is_a_term_with_two_degrees_of_freedom_or_blocks(tmp_path, process):
     process.write_text(PROCESS + SOLVENT.replace('"ethanol"', '"ethanol", "oil"'), encoding="utf-8")
-    path, said = made(tmp_path, "d-optimal", "--factors", process, "--model", "linear", "--runs", 12)
-    assert "not told for a factor of three names" in said
+    order = ("--factors", process, "--model", "linear", "--runs", 12, "--report", tmp_path / "plan")
+    path, said = made(tmp_path, "d-optimal", *order)
+    assert "what the interactions model will see" in said
+    assert re.search(r"between two names +1 ", said)
+    assert "tested by all of them at once (F)" in said
+    told = (tmp_path / "plan/report.md").read_text(encoding="utf-8")
+    assert re.search(
+        r"A change of \S+ σ by a factor \(low to high\) and \S+ σ between two names of a factor is seen", told
+    )
     effect = {"water": 0.0, "ethanol": 2.0, "oil": -2.0}
     lines = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
     noise = 0.1 * np.random.default_rng(1).standard_normal(12)

@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 from explorer.files.measured_curves import measured_file
+from explorer.photograph.target import load_target
 from solver.assets import measurement_folder, shipped_assets
 from solver.observables.silhouette import largest_part, silhouette
 from solver.pours.record import Spheres
@@ -175,6 +176,14 @@ def test_a_checkerboard_takes_the_lens_out(tmp_path):
     text = explorer("measure", bent_pile, "--checkerboard", board).stdout
     assert "checkerboard board.png: 48 corners, k = +0." in text
     assert "bends the base line" not in text
+    kept = explorer("measure", bent_pile, "--checkerboard", board, "--target", tmp_path / "target")
+    assert kept.exit_code == 0, kept.output
+    target = load_target(tmp_path / "target")
+    assert target.mean == found["pictures"][0]["angles"]["mean"]["value_deg"]
+    assert (target.result.piles[0].checkerboard, target.result.piles[0].lens) == (
+        "board.png",
+        found["checkerboard"]["lens_k"],
+    )
     alone = data(explorer("measure", bent_pile, "--json"))
     assert "checkerboard" not in alone
     assert abs(alone["pictures"][0]["angles"]["left"]["value_deg"] - 30.0) > 0.5
@@ -185,6 +194,6 @@ def test_no_checkerboard_in_one_line(pile, blank, tmp_path):
         explorer("measure", pile, "--checkerboard", blank)
     )
     board = save(tmp_path / "board.png", checkerboard(0.0)[:300])
-    assert "whole pictures of one camera" in refused(explorer("measure", pile, "--checkerboard", board))
-    both = ("--checkerboard", board, "--target", tmp_path / "target")
-    assert "--target" in refused(explorer("measure", pile, *both))
+    line = refused(explorer("measure", pile, "--checkerboard", board))
+    assert "checkerboard board.png: " in line
+    assert "whole pictures of one camera" in line

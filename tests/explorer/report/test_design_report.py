@@ -18,6 +18,7 @@ from explorer.design.result import DesignResult
 from explorer.design.text import analysis_text
 from explorer.report.content import Figure, Folded, Table
 from explorer.report.design import design_html, design_markdown
+from explorer.report.design.charts import design_plots
 from explorer.report.design.sections import sections_of
 
 pytestmark = pytest.mark.usefixtures("unprinted")
@@ -159,6 +160,23 @@ def test_what_acts_and_where_the_target_lies_are_in_short(result):
 def test_the_result_survives_json(result):
     kept = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert DesignResult.from_dict(kept).to_dict() == kept
+
+
+@pytest.mark.parametrize(
+    ("case", "title", "figure", "points"),
+    [
+        ("morris", "Elementary effects", "morris", 6),
+        ("names without a target", "Means of names", "names", 5),
+        ("random groups", "Groups", "groups", 12),
+    ],
+)
+def test_the_page_shows_the_report_s_chart_of_an_analysis_without_a_model(case, title, figure, points):
+    found = analyse_runs(CASES[case][0], AnalyseOrder("runs.csv", "load", None))
+    (drawn,) = [one for section in sections_of(found) for one in figures(section.blocks) if one.name == figure]
+    plots = design_plots(found)
+    assert list(plots) == [title]
+    assert plots[title].make() == drawn.spec
+    assert len(drawn.spec["data"][0]["x"]) == points
 
 
 def test_names_from_outside_are_escaped():

@@ -12,11 +12,13 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
+from doe.analysis.verification import verify
 from doe.provenance import About
+from doe.stages.surface import CONTRADICTION
 from explorer.design.analysis import AnalyseOrder, run_analyse
 from explorer.errors import CommandError
 from explorer.report import folder, study_report
-from explorer.report.content import DataTable, Drawing, Figure, Strong, Struck, Table, Word
+from explorer.report.content import Caution, DataTable, Drawing, Figure, Strong, Struck, Table, Word
 from explorer.report.design import design_report
 from explorer.report.diagnosis import diagnosis_report
 from explorer.report.folder import MANIFEST, NO_FIGURES, bibtex, write_report
@@ -290,6 +292,48 @@ def test_a_surface_of_noise_is_no_calibration_whatever_the_fresh_pours_say(study
     (table,) = report.sections[0].blocks
     assert all(isinstance(row[2], Struck) for row in table.rows)
     assert "<s>" in page(report)
+
+
+def test_of_several_targets_the_verdict_names_every_one():
+    report = study_report(reported_studies.typed(reported_studies.result_of_case("two targets")))
+    assert report.banner.word is Word.CALIBRATED
+    assert re.search(
+        r"gave \S+° against \S+° measured \(angle of repose, silhouette\) and \S+ kg/m³ against \S+ kg/m³ measured "
+        r"\(bulk density kg m3\)",
+        report.banner.why,
+    )
+    assert report.banner.why.count("equivalent to the measurement within") == 2
+    overview = next(section for section in report.sections if section.title == "In short")
+    facts = dict(overview.blocks[0].pairs)
+    assert {"Verification (bulk density kg m3)", "Noise of one pour (bulk density kg m3)"} <= set(facts)
+    assert not any("One number cannot fix" in block.text for block in overview.blocks if isinstance(block, Caution))
+    ascent = next(section for section in report.sections if section.title == "Steepest ascent")
+    assert [block.name for block in ascent.blocks if isinstance(block, Figure)] == ["ascent", "ascent-2"]
+    *_, together = [block for block in ascent.blocks if isinstance(block, Table)]
+    assert together.header[-2:] == ("misfit J", "desirability")
+    assert "All 2 targets together are missed least at step" in ascent.blocks[0].text
+    assert any("Derringer" in text for text in page(report).split("<li>"))
+
+
+def test_of_several_targets_any_may_spoil_the_verdict():
+    found = reported_studies.typed(reported_studies.result_of_case("two targets"))
+    spoiled = (found.surface.anova[0], dataclasses.replace(found.surface.anova[1], better_than_noise=False))
+    noisy = study_report(dataclasses.replace(found, surface=dataclasses.replace(found.surface, anova=spoiled))).banner
+    assert noisy.word is Word.NOT_CALIBRATED
+    assert noisy.why.startswith("The response surface of the bulk density kg m3 is not better than noise")
+    first, second = found.verification.tests
+    far = verify(second.target.mean + np.arange(40.0, 46.0), second.target.mean, 2.0, 10, 2.0)
+    missed = dataclasses.replace(
+        found,
+        verification=dataclasses.replace(found.verification, tests=(first, far)),
+        optimum=dataclasses.replace(
+            found.optimum, posterior=dataclasses.replace(found.optimum.posterior, p=CONTRADICTION / 2)
+        ),
+    )
+    banner = study_report(missed).banner
+    assert banner.word is Word.OUT_OF_REACH
+    assert "No setting of the region gives all targets at once (χ², p = 0.0050)" in banner.why
+    assert banner.why.count(" measured (") == 2
 
 
 # Joined

@@ -125,8 +125,8 @@ def test_what_it_takes_counts_the_pours_of_every_experiment(study, tmp_path):
     counts = runs_of_scenes(one, profile)
     assert set(counts) == {"", "drum"}
     assert sum(counts.values()) == sum(planned_runs(one, profile).values())
-    # Pilot, eight rows, fifteen points and the verification, once each in the drum.
-    assert counts["drum"] == profile.pilot_runs + 8 + 15 + profile.verification_runs
+    # Pilot, eight rows, the steps, fifteen points and the verification, once each in the drum.
+    assert counts["drum"] == profile.pilot_runs + 8 + profile.ascent_steps + 15 + profile.verification_runs
     seconds = sum(n * reckoned_time(one, profile, name) for name, n in counts.items()) / sum(counts.values())
     said = duration_text(one, profile, tmp_path / "none.sqlite", 2)
     assert said.startswith(f"{sum(counts.values())} runs")

@@ -32,7 +32,7 @@ from explorer.viewer.laboratory.design_panel import DesignPanel
 from explorer.viewer.laboratory.inputs import positive
 from explorer.viewer.laboratory.laboratory_panel import LaboratoryPanel
 from explorer.viewer.laboratory.measured_data_panel import BALANCES, NOTHING, PHOTOGRAPHS, MeasuredDataPanel
-from explorer.viewer.laboratory.photograph_panel import PhotographPanel
+from explorer.viewer.laboratory.photograph_panel import NO_BOARD, PhotographPanel
 from explorer.viewer.laboratory.rig_panel import RigPanel
 from explorer.viewer.panel import Now
 from explorer.viewer.study.diagnosis_panel import DiagnosisPanel
@@ -41,6 +41,10 @@ from solver.assets import asset_path
 from tests.explorer.command_line import explorer
 from tests.explorer.measured.test_balance import BEGINS, MASS, steady, write
 from tests.explorer.viewer.page_session import PageSession, event, finished, page_context
+from tests.solver.photograph.rendered import save
+from tests.solver.photograph.staged import Stage, staged
+from tests.solver.photograph.test_checkerboard import LOOK
+from tests.solver.photograph.test_checkerboard import board as checkerboard
 
 pytestmark = pytest.mark.usefixtures("unprinted")
 
@@ -302,6 +306,40 @@ def test_a_photograph_from_the_browser_is_read_and_shown(bench):
     assert bench.photograph.view._picture is not None
     assert bench.do(lambda: bench.photograph._photo._take("text.jpg", b"no picture")) == ""
     assert "text" in bench.do(bench.photograph._read)
+
+
+def test_a_checkerboard_tells_the_lens_of_a_photograph(bench, tmp_path):
+    panel = bench.photograph
+    pile = save(tmp_path / "pile.png", staged(Stage(30.0, fill=0.8, lens=0.1), replace(LOOK, tilt_deg=3.0)))
+    board = save(tmp_path / "board.png", checkerboard(0.1))
+    for slot, file in ((panel._photo, pile), (panel._board, board)):
+        assert bench.do(lambda slot=slot, file=file: slot._take(file.name, file.read_bytes())) == ""
+    assert bench.do(panel._read) == ""
+    said = unescape(text_of(panel.view)).replace("\u00a0", " ")
+    k, low, high = map(float, re.search(r"lens k</th><td[^>]*>(\S+) \(95 % (\S+) … (\S+)\): pincushion", said).groups())
+    assert low < k < high
+    assert (k, high - k) == (pytest.approx(0.1, abs=0.003), pytest.approx(0.0, abs=0.006))
+    assert "48; they miss a plane board by 0." in said
+    assert "bends the base line" not in said
+    words = shlex.split(panel.view._answer.command)
+    assert float(re.search(r"angle of repose</th><td[^>]*>(\S+)°", said)[1]) == pytest.approx(30.0, abs=0.5)
+    repeated = explorer(*words[1:])
+    assert f"k = {k:+.4f}" in repeated.stdout
+    # Without one, the base line, which passes the picture's middle here, tells nothing.
+    panel._board._choice.value = NO_BOARD
+    assert bench.do(panel._read) == ""
+    assert "lens k" not in text_of(panel.view)
+    assert "--checkerboard" not in panel.view._answer.command
+
+
+def test_what_is_no_checkerboard_is_refused_in_a_line(bench):
+    panel = bench.photograph
+    content = asset_path("photographs", "cone_25_30").read_bytes()
+    assert bench.do(lambda: panel._board._take("board.jpg", content)) == ""
+    line = bench.do(panel._read)
+    assert "no checkerboard" in line
+    assert "\n" not in line
+    assert panel._shown is None
 
 
 def test_an_example_comes_with_its_scale_and_ones_own_photograph_with_what_was_entered(bench):
