@@ -20,6 +20,7 @@ from explorer.commands import (
     calibrate,
     design,
     diagnose,
+    doctor,
     export,
     lab,
     limit,
@@ -113,9 +114,10 @@ def options(
     arch: str | None = typer.Option(None, metavar="ARCH", help="Where the solver computes: cpu, cuda or vulkan."),
 ) -> None:
     """Pour, pile and calibrate granular material."""
-    from solver.arch import choose
-
     if arch is not None:
+        # Here and not above: `doctor` is to start where a package of the solver is missing.
+        from solver.arch import choose
+
         choose(arch)
 
 
@@ -141,6 +143,7 @@ app.command()(report.report)
 app.command()(verify.verify)
 app.command()(bench.bench)
 app.command()(warm_up.warm_up)
+app.command()(doctor.doctor)
 app.command()(validate_diagnosis.validate_diagnosis)
 app.command()(limit.limit)
 app.add_typer(measurements.app, name="measurements")

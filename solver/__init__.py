@@ -6,6 +6,8 @@ reads photographs.
 """
 
 import importlib
+import os
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from solver.assets import AssetNotFoundError, asset_path
@@ -84,6 +86,9 @@ if TYPE_CHECKING:
     from solver.pours.run import Job, capacity_for, run_pour, run_pours, run_queue
     from solver.pours.worker_pool import WorkerPool, begin_worker, warm_up
 
+NO_HOME = "/nonexistent"
+"""As Debian calls the home of accounts that have none."""
+
 _LATE = {
     "Batch": "solver.engine.world",
     "WorkerPool": "solver.pours.worker_pool",
@@ -102,6 +107,26 @@ _LATE = {
     "run_queue": "solver.pours.run",
     "warm_up": "solver.pours.worker_pool",
 }
+
+
+def _need_a_home() -> None:
+    """Set ``HOME`` where it is not: Taichi aborts without, and what is kept for a user would land in a folder ``~``.
+
+    An account without an entry, as in a container, has no home: it gets one that there is not, so that what is kept
+    between commands is as in a place that cannot be written. (A folder that others may write into would be worse:
+    compiled kernels are read back from it and run.)
+    """
+    if os.environ.get("HOME"):
+        return
+    try:
+        # Of the account's entry: `home` would believe an empty variable.
+        os.environ.pop("HOME", None)
+        os.environ["HOME"] = str(Path.home())
+    except RuntimeError:
+        os.environ["HOME"] = NO_HOME
+
+
+_need_a_home()
 
 
 def __getattr__(name: str) -> Any:

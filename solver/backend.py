@@ -19,6 +19,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
+# Taichi would ask its makers once a day whether there is a newer one, and tell them system, Python and a number that
+# stands for this user.
+os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
 
 import taichi as ti
 from taichi.lang import impl
@@ -71,6 +74,26 @@ def init(threads: int | None = None) -> None:
     if impl.current_cfg().arch != arch:
         raise ParameterError(f"--arch {chosen()}: this machine has no such device that Taichi can use")
     _owner = current
+
+
+def trial() -> None:
+    """Start Taichi on the chosen processor and let it calculate in double precision.
+
+    Raises what :func:`init` does, and RuntimeError for a wrong sum: a device that has single precision only may round
+    instead of refusing.
+    """
+    init()
+
+    @ti.kernel  # type: ignore[untyped-decorator]
+    def thirds(n: ti.i32) -> ti.f64:
+        total = ti.cast(0.0, ti.f64)
+        for k in range(n):
+            total += k / 3.0
+        return total
+
+    n = 3000
+    if abs(thirds(n) - n * (n - 1) / 6.0) > 1e-6:
+        raise RuntimeError(f"{chosen()} calculates in less than double precision")
 
 
 def serial() -> bool:

@@ -5,7 +5,8 @@ import shutil
 
 import pytest
 
-CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+from explorer.installation import CHROMIUM_NAMES
+
 REQUIRE = {"liggghts": "REPOSE_REQUIRE_LIGGGHTS", "yade": "REPOSE_REQUIRE_YADE"}
 """Engines that `@pytest.mark.peers(engine)` may name, and the variables that make a missing one a failure."""
 NO_CHROMIUM = f"no Chromium found (looked for {', '.join(CHROMIUM_NAMES)} on PATH)"

@@ -40,8 +40,8 @@ def test_a_shard_that_there_is_not_is_refused(tmp_path):
 
 def test_an_installed_program_can_run_it(tmp_path):
     """All that the command imports, and the declared model, lie in the packages of a wheel."""
-    packages = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    for package in packages["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    for package in {*project["tool"]["hatch"]["build"]["targets"]["wheel"]["only-include"]} - {"assets"}:
         shutil.copytree(ROOT / package, tmp_path / package)
     shutil.copytree(ROOT / "assets", tmp_path / "solver/assets", ignore=shutil.ignore_patterns("pictures"))
     command = [sys.executable, "-m", "explorer", "validate-diagnosis", "--minutes", "0", "--store", "s.sqlite"]
