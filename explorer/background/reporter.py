@@ -27,6 +27,7 @@ from functools import partial
 from pathlib import Path
 from typing import IO, Self
 
+from doe.errors import StudyStopped
 from doe.pour_runner import Pours
 from explorer.background.progress import PROGRESS, Bar, Ending, ProgressEvent
 from explorer.scene.text import material_toml
@@ -198,8 +199,8 @@ class Reporter:
         # On a full disk, or with nobody who reads, the first error is the one to tell.
         with suppress(OSError) if error is not None else nullcontext():
             self._write(replace(last, outcome=outcome, result=self.result, error=told))
-        # The traceback of what is an error of the program, not of its input.
-        program = None if isinstance(error, ValueError | KeyboardInterrupt) else error
+        # The traceback of what is an error of the program, not of its input or of what the runs gave.
+        program = None if isinstance(error, ValueError | KeyboardInterrupt | StudyStopped) else error
         _log.log(
             logging.INFO if error is None else logging.ERROR,
             "%s: %s after %.1f s%s",
