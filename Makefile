@@ -8,7 +8,7 @@ BIN := .venv/bin
 EXPLORER := $(BIN)/explorer
 
 .DEFAULT_GOAL := help
-.PHONY: help venv serve calibrate calibrate-quick diagnose test slow nightly pictures photographs preview page-speed faults fuzz peers foreign rolling golden against-r clean
+.PHONY: help venv serve calibrate calibrate-quick diagnose test slow nightly pictures photographs preview page-speed faults memory fuzz peers foreign rolling golden against-r clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 18
@@ -63,6 +63,9 @@ page-speed: .venv/.ready ## frames/s and slider echo of the page: one and two br
 faults: .venv/.ready ## a study killed 20 times and a diagnosis 10 times, against unbroken ones (an hour)
 	$(BIN)/python -m tests.faults.kills study --kills 20
 	$(BIN)/python -m tests.faults.kills diagnosis --kills 10
+
+memory: .venv/.ready ## memory of a command and its worker over 10,000 pours of 0.06 CPU s (30 min)
+	$(BIN)/python -m tests.faults.memory --pours 10000
 
 fuzz: .venv/.ready ## 500 damaged or hostile files for each parser (15 min)
 	$(BIN)/python -m tests.faults.fuzz --inputs 500

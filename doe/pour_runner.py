@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -102,18 +102,25 @@ class PourRunner:
 
     def run(self, stage: str, settings: Sequence[Setting]) -> list[list[Run]]:
         """See :class:`Runner`. Runs found in the store are taken from there."""
+        found: list[list[Run]] = [[] for _ in settings]
+        for row, run in self.each(stage, settings):
+            found[row].append(run)
+        return [sorted(runs, key=self._order) for runs in found]
+
+    def each(self, stage: str, settings: Sequence[Setting]) -> Iterator[tuple[int, Run]]:
+        """Yield (number of the setting, run) as each ends, so that nobody has to keep them all."""
         scenes = {
             (row, name): with_values(self._scenes[name], setting.values)
             for row, setting in enumerate(settings)
             for name in setting.experiments
         }
-        found: list[list[Run]] = [[] for _ in settings]
+        ended: deque[tuple[int, Run]] = deque()
         places: list[tuple[int, str, int, int, str]] = []
         queue: deque[Job] = deque()
         waiting = [sum(setting.replicates * len(setting.experiments) for setting in settings)]
 
         def settle(run: Run, row: int) -> None:
-            found[row].append(run)
+            ended.append((row, run))
             again = not run.valid and run.attempt + 1 < self._tries
             waiting[0] -= 0 if again else 1
             if self._on_run is not None:
@@ -151,6 +158,8 @@ class PourRunner:
         def here(jobs: deque[Job], room: Sequence[Scene]) -> Iterable[tuple[Job, PourRecord]]:
             return run_queue(jobs, room, self._threads, on_sample=sample)
 
+        while ended:
+            yield ended.popleft()
         if queue:
             for job, record in (self._pours or here)(queue, list(scenes.values())):
                 row, experiment, replicate, attempt, key = places[job.tag]
@@ -160,7 +169,8 @@ class PourRunner:
                 stored = stored_run(job, record, self._study, stage, label, observables_of, key)
                 self._store.add(stored)
                 settle(_run(stored, settings[row], experiment, replicate, attempt), row)
-        return [sorted(runs, key=self._order) for runs in found]
+                while ended:
+                    yield ended.popleft()
 
     def _order(self, run: Run) -> tuple[int, int, int]:
         return list(self._scenes).index(run.experiment), run.replicate, run.attempt

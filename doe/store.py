@@ -195,16 +195,18 @@ class Store:
         record = self._record(run)
         return dataclasses.replace(run, outcome=str(record.outcome), message=record.message)
 
-    def pours_of(self, scene: Scene) -> tuple[StoredRun, ...]:
-        """Runs of exactly ``scene``, by seed: for every seed that any run has, what :meth:`find` finds by its key.
+    def pours_of(self, scene: Scene) -> Iterator[StoredRun]:
+        """Yield the runs of exactly ``scene``, by seed: for every seed that any run has, what :meth:`find` finds.
 
         None in a store of another physics, whose keys are others. Raises StoreError as :meth:`find`.
         """
         if self.physics != PHYSICS:
-            return ()
+            return
         with self._told():
             seeds = [seed for (seed,) in self._db.execute("SELECT DISTINCT seed FROM pours ORDER BY seed")]
-        return tuple(run for key in pour_keys(scene, seeds).values() if (run := self.find(key)) is not None)
+        for key in pour_keys(scene, seeds).values():
+            if (run := self.find(key)) is not None:
+                yield run
 
     def wall_times(self, study: str, parameters: Mapping[str, float | str]) -> list[float]:
         """Wall times [s] of the pours of ``study`` that have these ``parameters``, or lack them."""

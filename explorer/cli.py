@@ -108,10 +108,16 @@ def _print_version(wanted: bool) -> None:
 
 @app.callback()
 def options(
+    context: typer.Context,
     version: bool = typer.Option(
         False, "--version", callback=_print_version, is_eager=True, help="Print the version and exit."
     ),
     arch: str | None = typer.Option(None, metavar="ARCH", help="Where the solver computes: cpu, cuda or vulkan."),
+    log_level: str | None = typer.Option(
+        None,
+        metavar="LEVEL",
+        help="Log to standard error, as JSON lines, from this level on: debug, info, warning, error.",
+    ),
 ) -> None:
     """Pour, pile and calibrate granular material."""
     if arch is not None:
@@ -119,6 +125,16 @@ def options(
         from solver.arch import choose
 
         choose(arch)
+    if log_level is not None:
+        import logging
+        import sys
+
+        from explorer.background.reporter import LEVELS, logged
+        from explorer.errors import CommandError
+
+        if log_level.lower() not in LEVELS:
+            raise CommandError(f"--log-level {log_level}: allowed: {', '.join(LEVELS)}")
+        context.with_resource(logged(logging.StreamHandler(sys.stderr), log_level))
 
 
 app.command()(serve.serve)

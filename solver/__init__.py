@@ -84,7 +84,7 @@ if TYPE_CHECKING:
     from solver.pours.executor import Executor, executor
     from solver.pours.pour import Pour
     from solver.pours.run import Job, capacity_for, run_pour, run_pours, run_queue
-    from solver.pours.worker_pool import WorkerPool, begin_worker, warm_up
+    from solver.pours.worker_pool import PourBrokeOff, WorkerPool, begin_worker, warm_up
 
 NO_HOME = "/nonexistent"
 """As Debian calls the home of accounts that have none."""
@@ -97,6 +97,7 @@ _LATE = {
     "PhotographError": "solver.photograph",
     "PhotographedPile": "solver.photograph",
     "Pour": "solver.pours.pour",
+    "PourBrokeOff": "solver.pours.worker_pool",
     "begin_worker": "solver.pours.worker_pool",
     "capacity_for": "solver.pours.run",
     "executor": "solver.pours.executor",
@@ -175,6 +176,7 @@ __all__ = [
     "Pile",
     "PluginError",
     "Pour",
+    "PourBrokeOff",
     "Quantity",
     "RawPourError",
     "Record",

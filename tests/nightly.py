@@ -59,6 +59,7 @@ PARTS = {
     "a diagnosis killed 10 times": Part(
         (sys.executable, "-m", "tests.faults.kills", "diagnosis", "--kills", "10"), nightly=False
     ),
+    "memory over 10,000 pours": Part((sys.executable, "-m", "tests.faults.memory", "--pours", "10000"), nightly=False),
     "trefoils": Part((*SLOW, "tests/explorer/diagnosis/test_trefoils.py"), nightly=False),
     "other engines, 18 pours each": Part((*SLOW, "-s", "tests/peers/test_same_pile.py"), nightly=False),
     "benchmark": Part(

@@ -37,6 +37,10 @@ class Ended:
     message: str
     replicate: int = 0
     attempt: int = 0
+    wall_s: float = 0.0
+    """What it cost [s]."""
+    reused: bool = False
+    """Pours that are found in the store are not told."""
 
     @property
     def title(self) -> str:
@@ -182,7 +186,8 @@ class ModelPours:
             left += len(more) - 1
             if self._on_pour is not None:
                 label = f"{point.sequence} {point.number}, {self._conditions[c].name}"
-                self._on_pour(what, left, Ended(label, job.seed, record.outcome, record.message))
+                ended = Ended(label, job.seed, record.outcome, record.message, wall_s=record.wall_s)
+                self._on_pour(what, left, ended)
         return [found[k] for k in range(len(searches))]
 
     def records(self, points: Sequence[Point], condition: int) -> list[Record]:

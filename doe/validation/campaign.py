@@ -36,7 +36,7 @@ from doe.validation.reference import extended_to, kept
 from doe.validation.scanner import Scanner
 from doe.validation.sets import NONE, OUT_OF_REACH, SetRow, append_rows, read_rows
 from doe.validation.truth import REPLICATES, ROOT, Case, Strengths, Truth, cases, strengths_of, truth_of
-from doe.validation.work_place import OutOfTimeError, PourOrder, WorkPlace, complete
+from doe.validation.work_place import CampaignListener, OutOfTimeError, PourOrder, WorkPlace, complete
 from solver import EFFECTS, PHYSICS
 
 Data = dict[str, list[LaboratoryPour]]
@@ -95,7 +95,7 @@ class Judged:
     suggestion: Suggestion | None
 
 
-def run_campaign(order: CampaignOrder, say: Say) -> list[SetRow]:
+def run_campaign(order: CampaignOrder, say: Say, listener: CampaignListener | None = None) -> list[SetRow]:
     """Answer the data sets that ``sets.jsonl`` does not hold yet, until all are there or the time is over."""
     order.out.mkdir(parents=True, exist_ok=True)
     path, laboratory = order.out / SETS, read_laboratory(order.laboratory)
@@ -109,17 +109,20 @@ def run_campaign(order: CampaignOrder, say: Say) -> list[SetRow]:
             store = Store(order.store or default_store())
             stack.callback(store.close)
             place = stack.enter_context(
-                WorkPlace(store, order.workers or os.cpu_count() or 1, deadline, order.scheduler)
+                WorkPlace(store, order.workers or os.cpu_count() or 1, deadline, order.scheduler, listener)
             )
             try:
                 strengths = order.strengths or measured_strengths(order, laboratory, place, say)
                 answers = Answers(laboratory, strengths, place, order.budget, order.follow_up)
-                for case in todo:
+                for judged_now, case in enumerate(todo, start=1):
                     rows = answers.rows(case)
                     append_rows(path, rows)
                     for row in rows:
                         what = f"{row.kind} {row.label} {row.strength:g}, {row.offer}"
                         say(f"{row.number}: {what}: {row.verdict} ({row.answer}), {row.seconds:.0f} s")
+                    if listener is not None:
+                        done = len(asked) - len(todo) + judged_now
+                        listener.judged(done, len(asked), judged_now, f"{case.number}: {rows[-1].verdict}")
             except OutOfTimeError:
                 say(f"{order.minutes:g} min are over; all pours are kept, and the same command goes on")
     wanted = {case.seed for case in asked}
@@ -134,7 +137,7 @@ def measured_strengths(order: CampaignOrder, laboratory: Laboratory, place: Work
     found = kept(path, measurement, PHYSICS)
     if laboratory.reference is None:
         paths = [parameter.path for parameter in measurement.parameters]
-        pours = ModelPours(measurement.fit, paths, place.store, place.pours, place.look_at_the_clock, REFERENCE_ROOT)
+        pours = ModelPours(measurement.fit, paths, place.store, place.pours, place.ended, REFERENCE_ROOT)
         found = extended_to(found, ROUNDS, declared, pours, path, say)
     numbers = [feature_set(condition).offered(SCALARS) for condition in measurement.fit]
     study = limit_study(found.sample, found.levels, {SCALARS: numbers})
@@ -308,8 +311,7 @@ class Answers:
     def model_pours(self, conditions: Sequence[Condition], place: int | None = None) -> ModelPours:
         """Pours of the declared model, as a diagnosis makes them."""
         paths = [parameter.path for parameter in self.measurement.parameters]
-        clock = self.place.look_at_the_clock
-        return ModelPours(conditions, paths, self.place.store, self.place.pours, clock, place=place)
+        return ModelPours(conditions, paths, self.place.store, self.place.pours, self.place.ended, place=place)
 
 
 def label_of(truth: Truth) -> str:

@@ -11,10 +11,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from multiprocessing.pool import Pool
-from typing import Any
+from typing import Any, Protocol
 
+from doe.declared.pours import Ended
 from doe.measurement import Condition, readings_of_record
-from doe.pour_runner import stored_run
+from doe.pour_runner import Pours, stored_run
 from doe.store import Store
 from doe.validation.laboratory import LaboratoryPour
 from doe.validation.outside import AMPLITUDE, ON_BENCH, OUTSIDE, magnified, outside_pour
@@ -59,11 +60,38 @@ class PourOrder:
         return {name: float(x) for name, x in readings_of_record(self.condition, record).items()}
 
 
-class WorkPlace:
-    """Workers and a deadline [s] on ``time.monotonic``; a context that ends the workers."""
+class CampaignListener(Protocol):
+    """Someone who is told how far a campaign is."""
 
-    def __init__(self, store: Store, workers: int, deadline: float = math.inf, scheduler: str = "") -> None:
+    def pour(self, part: str, left: int, ended: Ended) -> None:
+        """A pour has ended, ``left`` more of this part are to come."""
+        ...
+
+    def judged(self, done: int, planned: int, judged_now: int, line: str) -> None:
+        """``done`` of ``planned`` data sets are there, ``judged_now`` of them by this run; ``line``: last answer."""
+        ...
+
+    def watched(self, pours: Pours) -> Pours:
+        """What takes the place of ``pours``, and sees every record."""
+        ...
+
+
+class WorkPlace:
+    """Workers and a deadline [s] on ``time.monotonic``; a context that ends the workers.
+
+    ``listener`` is told of every pour that ends.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        workers: int,
+        deadline: float = math.inf,
+        scheduler: str = "",
+        listener: CampaignListener | None = None,
+    ) -> None:
         self.store, self.workers, self.deadline, self.scheduler = store, workers, deadline, scheduler
+        self._listener = listener
         self.poured = 0
         self._stack = ExitStack()
         self._pool: Executor | None = None
@@ -82,11 +110,18 @@ class WorkPlace:
             self._pool = self._stack.enter_context(executor(self.workers, self.scheduler))
         return self._pool
 
-    def pours(self, queue: deque[Job], room: Sequence[Scene]) -> Iterator[tuple[Job, Record]]:
+    def pours(self, queue: deque[Job], room: Sequence[Scene]) -> Iterable[tuple[Job, Record]]:
         """Pours of the pool."""
-        return self.pool.run_queue(queue, room)
+        pours = self.pool.run_queue
+        return (pours if self._listener is None else self._listener.watched(pours))(queue, room)
 
-    def look_at_the_clock(self, *_: Any) -> None:
+    def ended(self, what: str, left: int, pour: Ended) -> None:
+        """Tell of a pour that has ended. Raises OutOfTimeError after the deadline."""
+        if self._listener is not None:
+            self._listener.pour(what, left, pour)
+        self.look_at_the_clock()
+
+    def look_at_the_clock(self) -> None:
         """Raise OutOfTimeError after the deadline."""
         if time.monotonic() > self.deadline:
             raise OutOfTimeError
@@ -98,12 +133,15 @@ class WorkPlace:
         queue = deque(Job(order.scene, order.seed, tag=k) for k, order in enumerate(plain))
         # A pair of effects may need more bodies than any single one.
         scenes = [*room, *(job.scene for job in queue)]
-        for job, record in self.pool.run_queue(queue, scenes) if queue else ():
-            self._keep(plain[job.tag], record)
+        left = len(wanted)
+        for job, record in self.pours(queue, scenes) if queue else ():
+            left -= 1
+            self._keep(plain[job.tag], record, left)
         strange = [order for order in wanted if order.outside]
         tasks = [(order.outside, order.scene, order.seed, order.amount) for order in strange]
         for order, record in zip(strange, self.map(_outside, tasks), strict=True):
-            self._keep(order, record)
+            left -= 1
+            self._keep(order, record, left)
         return [self._sample(order) for order in orders]
 
     def map(self, function: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Any]:
@@ -129,7 +167,7 @@ class WorkPlace:
         spheres = record.pile.spheres
         return LaboratoryPour(order.reader(record), spheres.centre, spheres.radius)
 
-    def _keep(self, order: PourOrder, record: Record) -> None:
+    def _keep(self, order: PourOrder, record: Record, left: int) -> None:
         job = Job(order.scene, order.seed)
         stored = stored_run(
             job,
@@ -143,7 +181,8 @@ class WorkPlace:
         )
         self.store.add(stored)
         self.poured += 1
-        self.look_at_the_clock()
+        label = " ".join(filter(None, (order.condition.name, order.outside)))
+        self.ended("laboratory", left, Ended(label, order.seed, record.outcome, record.message, wall_s=record.wall_s))
 
 
 def _outside(task: tuple[str, Scene, int, float]) -> Record:

@@ -41,10 +41,14 @@ def calibrate(
     ),
     summary: Path | None = typer.Option(None, metavar="FILE.md", help="Verdict and what moved, as Markdown for CI."),
     junit: Path | None = typer.Option(None, metavar="FILE.xml", help="The same as JUnit XML, a case per question."),
+    json: bool = typer.Option(
+        False, "--json", "--events", help="Print events for CI, one JSON object per line, and nothing else."
+    ),
 ) -> None:
     """Calibrate a material: pilot, reach, screening, ascent, response surface, optimum, verification, report."""
     from doe.errors import StudyStopped
     from doe.studies.baseline import BaselineError, compare, moved
+    from explorer.background.reporter import reporter_of
     from explorer.errors import CommandError
     from explorer.files.output_file import write_whole
     from explorer.study import for_ci
@@ -75,7 +79,8 @@ def calibrate(
         scheduler,
     )
     try:
-        result = run_study(order, typer.echo)
+        with reporter_of("calibrate", json) as reporter:
+            result = run_study(order, reporter)
     except StudyStopped as stopped:
         typer.echo(f"error: {' '.join(str(stopped).split())}", err=True)
         raise typer.Exit(FAILURE) from None

@@ -29,8 +29,12 @@ def diagnose(
     record: Path | None = typer.Option(
         None, metavar="FILE.rrd", help="New recording of the piles; a finished OUT is only recorded."
     ),
+    json: bool = typer.Option(
+        False, "--json", "--events", help="Print events for CI, one JSON object per line, and nothing else."
+    ),
 ) -> None:
     """Calibrate the declared model, test what is left, name the missing effect, confirm it by fresh pours."""
+    from explorer.background.reporter import reporter_of
     from explorer.diagnosis.run import DiagnoseOrder, run_diagnose
     from solver.assets import measurement_folder
 
@@ -53,4 +57,5 @@ def diagnose(
         record=record,
         scheduler=scheduler,
     )
-    run_diagnose(order, typer.echo)
+    with reporter_of("diagnose", json) as reporter:
+        run_diagnose(order, reporter)

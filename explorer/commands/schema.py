@@ -1,4 +1,4 @@
-"""``explorer schema``: what a file may hold, as JSON Schema for an editor."""
+"""``explorer schema``: what a file may hold, as JSON Schema for an editor; and an event of ``--json``, for CI."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ KINDS = {
     "factors": ("explorer.design.factors_file", "FactorsTable"),
     "part": ("explorer.laboratory.part", "PartFile"),
     "preset": ("explorer.scene.presets", "PresetFile"),
+    "events": ("explorer.background.progress", "ProgressEvent"),
 }
 """Kind of file → where its table is declared. Read when one is asked for: help loads no solver."""
 
@@ -37,7 +38,7 @@ def schema(
     kind: str = typer.Argument(metavar="KIND", help="One of the files below."),
     out: Path | None = typer.Option(None, metavar="FILE", help="Write it here instead of printing it."),
 ) -> None:
-    """Write the JSON Schema of a TOML file.
+    """Write the JSON Schema of a TOML file, or of the events that a long command prints with --json.
 
     An editor with a TOML language server (taplo, Even Better TOML) completes and checks keys by it where the file
     begins with the line: #:schema FILE

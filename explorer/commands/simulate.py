@@ -55,14 +55,23 @@ def simulate(
     ),
     resume: Path | None = typer.Option(None, metavar="FILE.npz", help="Go on from this checkpoint of the same scene."),
     json: bool = typer.Option(False, "--json", help="Print the result as JSON, and nothing else."),
+    events: bool = typer.Option(
+        False, "--events", help="Print events for CI instead, one JSON object per line, as the other long commands do."
+    ),
 ) -> None:
     """Pour a scene and print what came out, or run a bench test and print what it measured beside what was put in.
 
     A jam, a lost body or a cut-off is an outcome, not an error: the result names it, and the exit code is 0.
     """
+    import math
+    import sys
     from contextlib import ExitStack
+    from functools import partial
     from time import perf_counter
 
+    from doe.declared.pours import Ended
+    from explorer.background.progress import PourProgress, SimulatedTime
+    from explorer.background.reporter import EVERY, Reporter
     from explorer.errors import CommandError
     from explorer.files.checkpoint_writer import CheckpointWriter
     from explorer.files.run_folder import appearing, json_text, write_run
@@ -75,6 +84,8 @@ def simulate(
     from solver.rigs import BENCH_RIGS
     from solver.single_body import run_bench_test
 
+    if json and events:
+        raise CommandError("--json prints the result, --events what happens meanwhile; name one of them")
     if replicates > 1 and (checkpoint or resume):
         raise CommandError("--checkpoint and --resume are for one pour, not for --replicates")
     interrupted = read_checkpoint(resume) if resume else None
@@ -87,9 +98,10 @@ def simulate(
         from explorer.logs.recording import recorded_lines
     scene = with_settings(load_scene(source, material), set_)
     if scene.rig.name in BENCH_RIGS:
-        if record or checkpoint or resume or replicates > 1:
+        if record or checkpoint or resume or replicates > 1 or events:
             raise CommandError(
-                f"{scene.rig.name} is a bench test: --record, --checkpoint, --resume and --replicates are for pours"
+                f"{scene.rig.name} is a bench test: --record, --checkpoint, --resume, --replicates and --events are "
+                "for pours"
             )
         with ExitStack() as stack:
             folder = stack.enter_context(appearing(out)) if out else None
@@ -104,14 +116,23 @@ def simulate(
         threads = 1
     started = perf_counter()
     with ExitStack() as stack:
+        people = partial(typer.echo, err=True)
+        # With --json a pour that goes well says nothing else.
+        every = math.inf if json else EVERY
+        reporter = stack.enter_context(Reporter("simulate", people, sys.stdout if events else None, sys.stderr, every))
         folder = stack.enter_context(appearing(out)) if out else None
+        reporter.begin(resumed=resume is not None)
+        progress = PourProgress(reporter)
+        progress.compiling()
+        table = None if json or events else RunTable(typer.echo)
         recorder = recorder_of(record, seeds) if record else None
         if recorder:
-            if not json:
+            if table:
                 # Also after Ctrl-C: it is called once the files are closed.
                 stack.callback(lambda: typer.echo("\n".join(recorded_lines(recorder.pours))))
             stack.enter_context(recorder)
-        table = None if json else RunTable(typer.echo)
+        numerics = scene.numerics
+        within = SimulatedTime(reporter, numerics.duration or numerics.max_time) if replicates == 1 else None
         records: dict[int, Record] = {}
         kept = CheckpointWriter(checkpoint, CHECKPOINT_INTERVAL) if checkpoint else None
 
@@ -119,18 +140,24 @@ def simulate(
             for listener in (recorder, kept):
                 if listener:
                     listener.sample(k, pour)
+            if within:
+                within.sample(pour.time)
 
         jobs = [Job(scene, s, tag=k, interrupted=interrupted) for k, s in enumerate(seeds)]
         if replicates > 1 and not (recorder or kept) and chosen() == "cpu":
             # Nobody looks at them from within, so they run in processes of their own: in one, all wait for the slowest.
             pool = stack.enter_context(executor(min(threads or os.cpu_count() or 1, replicates), scheduler))
-            ended: Iterator[tuple[int, Record]] = (
+            pours: Iterator[tuple[int, Record]] = (
                 (job.tag, finished) for job, finished in pool.run_queue(deque(jobs), [scene])
             )
         else:
-            ended = run_pours(jobs, threads=threads, on_sample=sample)
-        for k, finished in ended:
+            pours = run_pours(jobs, threads=threads, on_sample=sample)
+        for k, finished in pours:
             records[k] = finished
+            if finished.outcome.unstable:
+                reporter.diverged(scene, finished.seed, finished, folder, out)
+            ended = Ended(scene.title, finished.seed, finished.outcome, finished.message, wall_s=finished.wall_s)
+            progress.pour("pours", replicates - len(records), ended)
             if recorder:
                 recorder.finish(k, finished)
             if table:
@@ -139,7 +166,8 @@ def simulate(
         result = result_of(scene, ordered, perf_counter() - started)
         if folder:
             write_run(folder, result, ordered)
+            reporter.result = out and out / "result.json"
     if table:
         table.summarise(result)
-    else:
+    elif json:
         typer.echo(json_text(result))

@@ -27,12 +27,17 @@ def validate_diagnosis(
     store: Path | None = typer.Option(None, help="SQLite file that keeps every pour."),
     threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),
     scheduler: str = typer.Option("", metavar="tcp://…", help="Pour on the workers of this Dask scheduler."),
+    json: bool = typer.Option(
+        False, "--json", "--events", help="Print events for CI, one JSON object per line, and nothing else."
+    ),
 ) -> None:
     """Diagnose made-up data with known truths and print how often the answer is right."""
     import math
 
-    from doe.validation.campaign import CampaignOrder, run_campaign
+    from doe.validation.campaign import SETS, CampaignOrder, run_campaign
     from doe.validation.laboratory import TREFOILS
+    from explorer.background.progress import SetProgress
+    from explorer.background.reporter import reporter_of
     from explorer.errors import CommandError
     from explorer.tables.validation import campaign_text
 
@@ -53,4 +58,11 @@ def validate_diagnosis(
         scheduler=scheduler,
         laboratory=laboratory or TREFOILS,
     )
-    typer.echo(campaign_text(run_campaign(order, typer.echo)))
+    with reporter_of("validate-diagnosis", json) as reporter:
+        out.mkdir(parents=True, exist_ok=True)
+        reporter.begin(out, resumed=(out / SETS).exists())
+        progress = SetProgress(reporter)
+        progress.compiling()
+        rows = run_campaign(order, reporter.say, progress)
+        reporter.result = out / SETS
+    reporter.say(campaign_text(rows))

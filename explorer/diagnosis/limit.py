@@ -21,6 +21,7 @@ from doe.validation.laboratory import read_laboratory
 from doe.validation.limit import RISK, RISKS, LimitStudy, Strength, confused, limit_study
 from doe.validation.reference import ROOT, Reference, extended_to, kept
 from doe.validation.replay import BASE_POURS, NULLS, PlantedTruth, Replayed, Teaching, replay
+from explorer.background.progress import time_left
 from explorer.files.output_file import write_whole
 from explorer.files.run_folder import json_text
 from explorer.tables.text_table import text_table
@@ -103,11 +104,14 @@ def _poured(
     order: LimitOrder, measurement: Measurement, declared: Declared, found: Reference, say: Callable[[str], None]
 ) -> Reference:
     """``found`` with the rounds that are missing."""
-    began = time.monotonic()
+    began, poured = time.monotonic(), 0
 
     def on_pour(what: str, left: int, _: Ended) -> None:
+        nonlocal poured
+        poured += 1
         if left % SAID_EVERY == 0:
-            say(f"{time.monotonic() - began:.0f} s: {what}, {left} pours to come")
+            elapsed = time.monotonic() - began
+            say(f"{elapsed:.0f} s: {what}, {left} pours to come{time_left(left * elapsed / poured)}")
 
     with ExitStack() as stack:
         store = Store(order.store or default_store())

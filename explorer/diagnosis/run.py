@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -26,7 +25,8 @@ from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summaries
 from doe.store import Store, default_store
 from explorer.background.output_folder import kept_for_one, read_result
-from explorer.background.progress import PROGRESS, PourProgress
+from explorer.background.progress import PourProgress
+from explorer.background.reporter import Reporter
 from explorer.diagnosis.corrected import corrected_toml, study_toml
 from explorer.diagnosis.next_folder import read_next, write_next
 from explorer.diagnosis.result import (
@@ -90,7 +90,7 @@ class DiagnoseOrder:
     """Address of a Dask scheduler whose workers pour; "" for processes of this machine."""
 
 
-def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> DiagnosisResult:
+def run_diagnose(order: DiagnoseOrder, reporter: Reporter) -> DiagnosisResult:
     """Run the loop and write the files; returns the content of ``diagnosis.json``.
 
     Finished pours are kept in the store, so an interrupted one goes on. With ``record`` the answer that stands in the
@@ -99,8 +99,8 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> DiagnosisR
     if order.record is not None:
         check_new_file(order.record, suffix=".rrd")
         if (finished := None if order.resume else _finished(order)) is not None:
-            say(f"{order.out}: finished already; only recorded")
-            _recorded(order.record, finished, say)
+            reporter.say(f"{order.out}: finished already; only recorded")
+            _recorded(order.record, finished, reporter.say)
             return finished
     unknown = [name for name in order.effects if name not in EFFECTS]
     if unknown:
@@ -110,14 +110,15 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> DiagnosisR
         raise CommandError(f"--out {order.out}: is not empty; name a new folder, or add --resume to go on there")
     asked = read_next(order.follow_up) if order.follow_up else None
     with kept_for_one(order.out):
-        return _run(order, measurement, asked.measurement if asked else None, say)
+        reporter.begin(order.out, order.resume)
+        return _run(order, measurement, asked.measurement if asked else None, reporter)
 
 
 def _run(
-    order: DiagnoseOrder, measurement: Measurement, follow_up: Measurement | None, say: Callable[[str], None]
+    order: DiagnoseOrder, measurement: Measurement, follow_up: Measurement | None, reporter: Reporter
 ) -> DiagnosisResult:
     """Pour, judge and write into ``order.out``, which is there and this command's alone."""
-    names = order.effects or tuple(EFFECTS)
+    say, names = reporter.say, order.effects or tuple(EFFECTS)
     path = order.store or default_store()
     budget = Budget()
     if order.budget is not None:
@@ -126,19 +127,20 @@ def _run(
         f"{order.folder}: {len(measurement.fit)} fitted and {len(measurement.holdout)} held-out conditions; store "
         f"{path}"
     )
-    progress = PourProgress(order.out / PROGRESS, say, terminal=sys.stdout.isatty())
+    progress = PourProgress(reporter)
     progress.compiling()
     with ExitStack() as stack:
-        stack.callback(progress.close)
         store = Store(path)
         stack.callback(store.close)
         pool = stack.enter_context(executor(order.threads, order.scheduler))
+        pours = reporter.watched(pool.run_queue)
         found = run_diagnosis(
-            measurement, store, pool.run_queue, names, budget, progress.stage, progress.pour, order.seed, follow_up
+            measurement, store, pours, names, budget, progress.stage, progress.pour, order.seed, follow_up
         )
-    result = result_of(measurement, order, found, progress.elapsed)
+    result = result_of(measurement, order, found, reporter.elapsed)
     text = json.dumps(result.to_dict(), ensure_ascii=False, allow_nan=False, indent=1)
-    write_whole(order.out / result.NAME, text + "\n")
+    reporter.result = order.out / result.NAME
+    write_whole(reporter.result, text + "\n")
     missing = write_report(diagnosis_report(result), order.out, {result.NAME: text + "\n"})
     say(f"{order.out}/report.html, report.md, {result.NAME}")
     if missing:

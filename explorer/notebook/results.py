@@ -13,6 +13,7 @@ from doe.record import Document
 from doe.studies.study import TRIES
 from doe.studies.study_result import StudyResult
 from explorer.background.output_folder import checked_folder, read_result
+from explorer.background.reporter import Reporter
 from explorer.diagnosis import run as diagnosis_run
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.errors import CommandError
@@ -79,7 +80,8 @@ def run_study(
     """
     kept = None if store is None else Path(store)
     order = study_run.StudyOrder(str(study), profile, Path(out), resume, kept, threads=workers, tries=tries)
-    return study_run.run_study(order, say)
+    with Reporter("calibrate", say) as reporter:
+        return study_run.run_study(order, reporter)
 
 
 def load_study(folder: str | Path) -> StudyResult:
@@ -147,7 +149,8 @@ def diagnose(
         seed=seed,
         follow_up=None if follow_up is None else Path(follow_up),
     )
-    return diagnosis_run.run_diagnose(order, say)
+    with Reporter("diagnose", say) as reporter:
+        return diagnosis_run.run_diagnose(order, reporter)
 
 
 def load_diagnosis(folder: str | Path) -> DiagnosisResult:

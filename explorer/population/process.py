@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 from doe.population import Population
@@ -64,5 +65,7 @@ class PopulationProcess:
 
 def populations(store: Store, scene: Scene, names: Sequence[str]) -> tuple[Population, ...]:
     """Observables ``names`` over the stored pours of ``scene``, of the present version of the readings."""
-    runs = [store.read(run, names, observables_of) for run in store.pours_of(scene)]
+    read = (store.read(run, names, observables_of) for run in store.pours_of(scene))
+    # Without what takes memory: there may be ten thousand.
+    runs = [replace(run, raw=b"", parameters={}) for run in read]
     return tuple(Population.of(runs, name) for name in names)

@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import os
-import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from itertools import count, islice
 from pathlib import Path
 
 from doe.population import Population
 from doe.pour_runner import PourRunner
-from doe.run_records import Run, Setting
+from doe.run_records import Setting
 from doe.store import Store, default_store
-from explorer.background.progress import PROGRESS, RunProgress, told_of_pauses
+from explorer.background.progress import RunProgress, told_of_pauses
+from explorer.background.reporter import Reporter
 from explorer.errors import CommandError
 from explorer.population.process import populations
-from solver import Scene, executor, observable_names
+from solver import Scene, executor, observable_names, run_queue
 from solver.arch import chosen
 
 STAGE = "pours"
 """Name of the one stage, in the progress and in the store."""
+MOST_SEEDS = 20
+"""Seeds that are told one by one."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ class PoursOrder:
     """Address of a Dask scheduler whose workers pour; "" for processes of this machine."""
 
 
-def pour_more(order: PoursOrder, say: Callable[[str], None]) -> tuple[Population, ...]:
+def pour_more(order: PoursOrder, reporter: Reporter) -> tuple[Population, ...]:
     """Pour, and return the population of every observable of the rig, earlier pours included.
 
     Seeds are the smallest from 1 on that the store does not hold for this scene. Finished pours are kept whatever
@@ -50,26 +53,22 @@ def pour_more(order: PoursOrder, say: Callable[[str], None]) -> tuple[Population
     with ExitStack() as stack:
         stack.callback(store.close)
         seeds = new_seeds((run.seed for run in store.pours_of(order.scene)), order.pours)
-        say(f"{order.scene.title}: {order.pours} pours, seeds {', '.join(map(str, seeds))}; store {path}")
-        progress: RunProgress | None = None
+        told = ", ".join(map(str, seeds)) if len(seeds) <= MOST_SEEDS else f"{seeds[0]} … {seeds[-1]}"
+        reporter.say(f"{order.scene.title}: {order.pours} pours, seeds {told}; store {path}")
         if order.out is not None:
             order.out.mkdir(parents=True, exist_ok=True)
-            file = order.out / PROGRESS
-            progress = RunProgress(file, {STAGE: order.pours}, say, terminal=sys.stdout.isatty())
-            stack.callback(progress.close)
-            stack.enter_context(told_of_pauses(progress.went_on))
-            progress.compiling()
-
-        def ended(stage: str, run: Run, remaining: int) -> None:
-            if progress is not None:
-                progress.run(stage, run, remaining)
-
+        reporter.begin(order.out)
+        progress = RunProgress(reporter, {STAGE: order.pours})
+        stack.enter_context(told_of_pauses(progress.went_on))
+        progress.compiling()
         workers = min(order.threads or os.cpu_count() or 1, order.pours)
         pool = stack.enter_context(executor(workers, order.scheduler)) if chosen() == "cpu" else None
-        pours = pool.run_queue if pool else None
+        pours = reporter.watched(pool.run_queue if pool else partial(run_queue, threads=order.threads))
         name = order.scene.title
-        runner = PourRunner(order.scene, store, name, 0, order.threads, on_run=ended, pours=pours, seeds=seeds)
-        runner.run(STAGE, [Setting(STAGE, {}, order.pours)])
+        runner = PourRunner(order.scene, store, name, 0, order.threads, on_run=progress.run, pours=pours, seeds=seeds)
+        for _ in runner.each(STAGE, [Setting(STAGE, {}, order.pours)]):
+            pass  # told by then, and in the store: memory must not grow with the number of pours
+        reporter.result = path
         return populations(store, order.scene, observable_names(order.scene))
 
 

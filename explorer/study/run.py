@@ -7,9 +7,9 @@ its analysis of the runs so far, and ``line`` says it in words. The file is gone
 
 from __future__ import annotations
 
+import functools
 import json
 import re
-import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -38,7 +38,8 @@ from doe.studies.study_result import (
     Timing,
 )
 from explorer.background.output_folder import kept_for_one, read_result
-from explorer.background.progress import PROGRESS, RunProgress, told_of_pauses
+from explorer.background.progress import RunProgress, told_of_pauses
+from explorer.background.reporter import Reporter
 from explorer.errors import CommandError
 from explorer.files.output_file import check_new_file, write_whole
 from explorer.files.run_result import made_today, versions
@@ -47,7 +48,7 @@ from explorer.report import write_report
 from explorer.report.photograph import PhotographResult
 from explorer.report.set_up import set_up_of
 from explorer.study.process import PARTIAL, RESULT
-from solver import executor, pour_rig, unpacked
+from solver import executor, pour_rig, run_queue, unpacked
 from solver.arch import chosen
 from solver.observables.made_up import estimator_bias
 from solver.observables.repose import AZIMUTHS_DEG, flank_feet, outline
@@ -87,7 +88,7 @@ class StudyOrder:
     """Address of a Dask scheduler whose workers pour; "" for processes of this machine."""
 
 
-def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
+def run_study(order: StudyOrder, reporter: Reporter) -> StudyResult:
     """Run the whole chain and write the files; returns the content of ``result.json``.
 
     Finished runs are kept in the store, so a study that was interrupted goes on where it stopped. With ``piles`` the
@@ -99,8 +100,8 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
     if order.piles is not None:
         check_new_file(order.piles, suffix=".rrd")
         if (finished := None if order.resume else _finished(order.out, study.file, profile.name)) is not None:
-            say(f"{order.out}: finished already; only recorded")
-            _record_piles(order.piles, finished, say)
+            reporter.say(f"{order.out}: finished already; only recorded")
+            _record_piles(order.piles, finished, reporter.say)
             return finished
     photographed = given_target(order)
     if photographed is not None:
@@ -109,7 +110,8 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
     if order.out.is_file() or (holds_more_than(order.out, own) and not order.resume):
         raise CommandError(f"--out {order.out}: is not empty; name a new folder, or add --resume to go on there")
     with kept_for_one(order.out):
-        return _run(order, study, profile, photographed, say)
+        reporter.begin(order.out, order.resume)
+        return _run(order, study, profile, photographed, reporter)
 
 
 def _run(
@@ -117,17 +119,17 @@ def _run(
     study: Study,
     profile: Profile,
     photographed: PhotographedTarget | None,
-    say: Callable[[str], None],
+    reporter: Reporter,
 ) -> StudyResult:
     """Pour, analyse and write into ``order.out``, which is there and this command's alone."""
-    planned = planned_runs(study, profile)
+    say, planned = reporter.say, planned_runs(study, profile)
     path = order.store or default_store()
     store = Store(path)
     if photographed is not None:
         photographed.copied(order.out / FOLDER)
         say(f"target: {photographed.line}")
     say(f"{study.name}, profile {profile.name}: {sum(planned.values())} runs of {1e3 * profile.mass:g} g; store {path}")
-    progress = RunProgress(order.out / PROGRESS, planned, say, terminal=sys.stdout.isatty())
+    progress = RunProgress(reporter, planned)
     progress.compiling()
     partial = PartialResult(order.out, StudyDescription.of(study, profile, order.tries))
     follower = PartialStages(partial.show)
@@ -137,13 +139,13 @@ def _run(
         follower.add(stage, run)
 
     with ExitStack() as stack:
-        stack.callback(progress.close)
         stack.enter_context(told_of_pauses(progress.went_on))
         stack.callback(store.close)
         recorder = stack.enter_context(_recorder(order.record)) if order.record else None
         # A recorder watches pours from within; all others run in processes of their own.
         poured_apart = recorder is None and chosen() == "cpu"
         pool = stack.enter_context(executor(order.threads, order.scheduler)) if poured_apart else None
+        pours = pool.run_queue if pool else functools.partial(run_queue, threads=order.threads)
         runner = PourRunner(
             study.scene,
             store,
@@ -152,7 +154,7 @@ def _run(
             order.threads,
             on_run=ended,
             observer=recorder,
-            pours=pool.run_queue if pool else None,
+            pours=None if recorder else reporter.watched(pours),
             tries=order.tries,
             experiments=study.experiments,
         )
@@ -160,10 +162,11 @@ def _run(
         found = run_campaign(study, profile, runner, bias, progress.stage, follower.begin, partial.keep)
         piles = poured_piles(found.stages, store) if PILE in pour_rig(study.scene).gives else ()
     about = made_today(order.author, order.notes)
-    result = replace(result_of(study, profile, found, progress.elapsed, order.tries, about), piles=piles)
+    result = replace(result_of(study, profile, found, reporter.elapsed, order.tries, about), piles=piles)
     text = json.dumps(result.to_dict(), ensure_ascii=False, allow_nan=False, indent=1)
     # First and by itself: a report that cannot be written costs no study.
-    write_whole(order.out / "result.json", text + "\n")
+    reporter.result = order.out / RESULT
+    write_whole(reporter.result, text + "\n")
     missing = write_report(result, order.out, {"result.json": text + "\n"})
     partial.remove()
     say(f"{order.out}/report.html, report.md, result.json")

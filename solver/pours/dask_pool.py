@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any, Self
 
-from solver.pours.worker_pool import Rooms, WorkerLost
+from solver.pours.worker_pool import PourBrokeOff, Rooms, WorkerLost
 from solver.scenes.scene import Scene
 from solver.version import PHYSICS
 
@@ -74,7 +74,7 @@ class DaskPool:
     def run_queue(self, queue: deque[Job], room: Sequence[Scene]) -> Iterator[tuple[Job, Record]]:
         """Run the jobs in ``queue`` and yield (job, record) as each finishes; jobs may be appended meanwhile.
 
-        ``room`` lists scenes that any job has to fit into. Raises RuntimeError with a worker's error, WorkerLost where
+        ``room`` lists scenes that any job has to fit into. Raises PourBrokeOff with a worker's error, WorkerLost where
         workers died over the same pour again and again, SchedulerError for a worker of another version.
         """
         from distributed import as_completed
@@ -99,7 +99,7 @@ class DaskPool:
                 if isinstance(error, SchedulerError):
                     raise error
                 if error is not None:
-                    raise RuntimeError(f"a pour broke off: {error!r}") from error
+                    raise PourBrokeOff(job, error) from error
                 yield job, future.result()
         finally:
             self._client.cancel(list(asked))

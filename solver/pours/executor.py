@@ -19,7 +19,7 @@ class Executor(Protocol):
     def run_queue(self, queue: deque[Job], room: Sequence[Scene]) -> Iterator[tuple[Job, Record]]:
         """Run the jobs in ``queue`` and yield (job, record) as each finishes; jobs may be appended meanwhile.
 
-        ``room`` lists scenes that any job has to fit into. Raises RuntimeError with the error of a pour that broke off.
+        ``room`` lists scenes that any job has to fit into. Raises PourBrokeOff with the error of a pour.
         """
         ...
 

@@ -39,6 +39,11 @@ class Outcome(StrEnum):
         """True if what is read off the run counts."""
         return self in (Outcome.AT_REST, Outcome.MEASURED)
 
+    @property
+    def unstable(self) -> bool:
+        """True if the numbers of the run cannot be trusted: it diverged, or lost what it should hold."""
+        return self in (Outcome.NON_FINITE, Outcome.OVERLAP_LIMIT, Outcome.BUFFER_OVERFLOW, Outcome.LOST_BODY)
+
 
 Verdict = tuple[Outcome, str]
 """Outcome and message; the message is empty where the outcome says all."""

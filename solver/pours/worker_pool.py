@@ -9,6 +9,7 @@ by a user or for memory, is replaced, and its pour begun again.
 
 from __future__ import annotations
 
+import logging
 import multiprocessing as mp
 import os
 import signal
@@ -42,8 +43,19 @@ LOSSES = 3
 """Workers that may end over one pour: a fourth would, too."""
 
 
+_log = logging.getLogger(__name__)
+
+
 class WorkerLost(RuntimeError):
     """A worker process has ended before its work was done."""
+
+
+class PourBrokeOff(RuntimeError):
+    """A pour ended by an error of the program; ``job`` is the one that does so again."""
+
+    def __init__(self, job: Job, error: BaseException) -> None:
+        super().__init__(f"a pour broke off: {error!r}; seed {job.seed} of {job.scene.title!r}")
+        self.job = job
 
 
 class WorkerPool:
@@ -57,7 +69,7 @@ class WorkerPool:
     def run_queue(self, queue: deque[Job], room: Sequence[Scene]) -> Iterator[tuple[Job, Record]]:
         """Run the jobs in ``queue`` and yield (job, record) as each finishes; jobs may be appended meanwhile.
 
-        ``room`` lists scenes that any job has to fit into. Raises RuntimeError with a worker's error, and WorkerLost
+        ``room`` lists scenes that any job has to fit into. Raises PourBrokeOff with a worker's error, and WorkerLost
         where ``LOSSES`` workers ended over the same job.
         """
         self._processes += [_worker() for _ in range(self.workers - len(self._processes))]
@@ -72,6 +84,8 @@ class WorkerPool:
                     f"{LOSSES} worker processes have ended over the same pour, seed {job.seed} of {job.scene.title!r}: "
                     "killed from outside, or out of memory"
                 )
+            again = f"the pour with seed {job.seed} of {job.scene.title!r} is begun again by another"
+            _log.warning("a worker process has ended (%d of %d losses): %s", losses[id(job)], LOSSES, again)
             queue.appendleft(job)
             return self._with_room(self._another(pipe), room)
 
@@ -90,6 +104,8 @@ class WorkerPool:
                     except WorkerLost:
                         idle.append(replaced(pipe, job))
                         continue
+                    if isinstance(record, BaseException):
+                        raise PourBrokeOff(job, record) from record
                     idle.append(pipe)
                     yield job, record
         finally:
@@ -165,7 +181,8 @@ def warm_up(rooms: Sequence[Sequence[Scene]], workers: int | None = None) -> Ite
                 _send(pipe, list(rooms[numbers[0]]))
                 _send(pipe, None)
             for pipe in [ready for ready in wait(list(busy)) if isinstance(ready, Connection)] if busy else []:
-                _answer(pipe)
+                if isinstance(error := _answer(pipe), BaseException):
+                    raise RuntimeError(f"the kernels could not be compiled: {error!r}") from error
                 numbers, process, began = busy.pop(pipe)
                 pipe.close()
                 process.join()
@@ -202,13 +219,11 @@ def _send(pipe: Connection, order: Any) -> None:
 
 
 def _answer(pipe: Connection) -> Any:
+    """What a worker sends: a record, None, or the error that it met."""
     try:
-        answer = pipe.recv()
+        return pipe.recv()
     except (EOFError, OSError):
         raise WorkerLost(GONE) from None
-    if isinstance(answer, BaseException):
-        raise RuntimeError(f"a pour broke off: {answer!r}") from answer
-    return answer
 
 
 @contextmanager

@@ -60,7 +60,7 @@ def test_an_angle_of_zero_is_a_value(store):
 def test_a_store_of_another_physics_has_no_pours_of_any_scene(store):
     store.add(stored(SCENE, 1, 20.0))
     store.physics += 1
-    assert store.pours_of(SCENE) == ()
+    assert list(store.pours_of(SCENE)) == []
 
 
 def test_the_interval_is_that_of_the_mean():

@@ -5,14 +5,17 @@ import json
 from doe.declared.pours import Ended
 from explorer.background.command_process import CommandStatus
 from explorer.background.progress import PourProgress, ProgressEvent, failures, with_event, with_run
+from explorer.background.reporter import Reporter
 from explorer.viewer.study.process_view import state_markdown
 from solver import Outcome
 
 
 def test_a_pour_that_broke_off_is_told_with_its_seed(tmp_path):
-    progress = PourProgress(tmp_path / "progress.jsonl", lambda line: None, terminal=False)
-    progress.pour("screening", 2, Ended("air_drag@2 0, fast", 11, Outcome.AT_REST, ""))
-    progress.pour("screening", 1, Ended("air_drag@2 1, fast", 12, Outcome.JAMMED, "the outlet is blocked"))
+    with Reporter("diagnose", lambda line: None) as reporter:
+        reporter.begin(tmp_path)
+        progress = PourProgress(reporter)
+        progress.pour("screening", 2, Ended("air_drag@2 0, fast", 11, Outcome.AT_REST, ""))
+        progress.pour("screening", 1, Ended("air_drag@2 1, fast", 12, Outcome.JAMMED, "the outlet is blocked"))
     stages, tried = (), ()
     for line in (tmp_path / "progress.jsonl").read_text().splitlines():
         event = ProgressEvent.from_dict(json.loads(line))

@@ -8,6 +8,7 @@ import pytest
 
 from doe.run_records import Setting
 from explorer.background.progress import RunProgress, told_of_pauses
+from explorer.background.reporter import Reporter
 from tests.doe.formula_runner import FormulaRunner
 
 
@@ -22,16 +23,23 @@ class Clock:
 RUNS = [run for row in FormulaRunner(lambda values: 20.0, jam=0.3).run("scan", [Setting("a", {}, 12)]) for run in row]
 
 
-def progress_of(tmp_path, clock):
-    return RunProgress(tmp_path / "progress.jsonl", {"pilot": 4, "scan": 12}, lambda line: None, False, clock)
+@pytest.fixture
+def reporter(tmp_path):
+    with Reporter("calibrate", lambda line: None) as reporter:
+        reporter.begin(tmp_path)
+        yield reporter
+
+
+def progress_of(reporter, clock):
+    return RunProgress(reporter, {"pilot": 4, "scan": 12}, clock)
 
 
 def events(tmp_path):
     return [json.loads(line) for line in (tmp_path / "progress.jsonl").read_text().splitlines()]
 
 
-def test_every_run_is_told_with_its_outcome_and_every_stage_with_its_runs(tmp_path):
-    progress = progress_of(tmp_path, Clock())
+def test_every_run_is_told_with_its_outcome_and_every_stage_with_its_runs(tmp_path, reporter):
+    progress = progress_of(reporter, Clock())
     progress.compiling()
     for run, left in zip(RUNS, range(20, 0, -1), strict=False):
         progress.run("scan", run, left)
@@ -46,9 +54,9 @@ def test_every_run_is_told_with_its_outcome_and_every_stage_with_its_runs(tmp_pa
     assert (told[-1]["line"], told[-1]["run"]) == ("found", None)
 
 
-def test_the_time_left_follows_from_finished_runs_without_pauses(tmp_path):
+def test_the_time_left_follows_from_finished_runs_without_pauses(reporter):
     clock = Clock()
-    progress = progress_of(tmp_path, clock)
+    progress = progress_of(reporter, clock)
     assert progress.eta_s() is None
     for k in range(5):
         clock.now += 2.0

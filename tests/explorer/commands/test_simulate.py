@@ -14,7 +14,8 @@ from explorer.logs.recording_reader import read_recording
 from explorer.scene.file import load_scene, with_settings
 from solver import Outcome, run_pour, run_pours
 from solver.observables import Value, observe
-from tests.explorer.command_line import TINY, explorer, settings
+from tests.explorer.command_line import TINY, explorer, refused, settings
+from tests.explorer.events import checked_events
 
 
 @pytest.fixture(scope="module")
@@ -114,6 +115,27 @@ def test_table_for_people(record, monkeypatch):
     assert row.split()[:2] == ["5", "time_limit"]
     assert message.strip() == record.message
     assert "angle_of_repose_deg" in result.stdout
+
+
+@pytest.mark.usefixtures("taichi")
+def test_a_pour_that_diverges_leaves_the_scene_that_does_so_again(tmp_path):
+    wild = TINY | {"material.seed.shear_modulus": "10kPa", "insertion.drop_speed": "10m/s"}
+    arguments = ("--seed", 3, "--events", "--out", tmp_path / "run")
+    result = explorer("simulate", "funnel", *settings(wild), *arguments)
+    _, pour, end = checked_events(result.stdout)
+    assert (pour["run"]["outcome"], pour["scene"]) == ("overlap_limit", str(tmp_path / "run" / "diverged_3.toml"))
+    assert (end["outcome"], end["result"]) == ("finished", str(tmp_path / "run" / "result.json"))
+    (line,) = result.stderr.splitlines()
+    assert line.endswith(f"again: explorer simulate {pour['scene']} --seed 3")
+    assert explorer("simulate", pour["scene"], "--seed", 3, "--out", tmp_path / "again").exit_code == 0
+    first, again = (json.loads((tmp_path / name / "result.json").read_text()) for name in ("run", "again"))
+    for key in ("outcome", "message", "steps", "parameters"):
+        assert first[key] == again[key]
+    assert first["runs"][0]["energy"] == again["runs"][0]["energy"]
+
+
+def test_events_and_the_result_are_not_printed_together():
+    assert "name one of them" in refused(explorer("simulate", "funnel", "--json", "--events"))
 
 
 @pytest.mark.parametrize(("failure", "code"), [(KeyboardInterrupt, 130), (RuntimeError, 1)])

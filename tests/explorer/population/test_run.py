@@ -11,6 +11,7 @@ import pytest
 
 from doe.store import Store
 from explorer.background.progress import PROGRESS
+from explorer.background.reporter import Reporter
 from explorer.errors import CommandError
 from explorer.population.process import PopulationProcess
 from explorer.population.run import PoursOrder, new_seeds, pour_more
@@ -38,7 +39,7 @@ def poured(tmp_path_factory):
 
 def test_more_pours_have_seeds_of_their_own_and_keys_like_any_pour(poured):
     store = Store(poured / "s.sqlite", pouring=False)
-    runs = store.pours_of(SCENE)
+    runs = list(store.pours_of(SCENE))
     assert [run.seed for run in runs] == [1, 2, 3]
     assert all(store.find(pour_key(SCENE, seed)).seed == seed for seed in (1, 2, 3))
     store.close()
@@ -46,7 +47,12 @@ def test_more_pours_have_seeds_of_their_own_and_keys_like_any_pour(poured):
 
 def test_progress_counts_the_pours(poured):
     lines = [json.loads(line) for line in (poured / "out0" / PROGRESS).read_text().splitlines()]
-    assert [(line["done"], line["planned"]) for line in lines] == [(0, 2), (1, 2), (2, 2)]
+    assert [(line["event"], line["done"], line["planned"]) for line in lines] == [
+        ("start", 0, 2),
+        ("pour", 1, 2),
+        ("pour", 2, 2),
+        ("end", 2, 2),
+    ]
 
 
 def test_what_the_process_reads_is_what_the_command_has_poured(poured):
@@ -63,7 +69,7 @@ def test_a_store_that_is_not_there_is_an_empty_population_and_stays_away(tmp_pat
 def test_a_folder_with_something_in_it_is_refused(tmp_path):
     (tmp_path / "notes").write_text("mine")
     with pytest.raises(CommandError, match="not empty"):
-        pour_more(PoursOrder(SCENE, 1, tmp_path, tmp_path / "s.sqlite"), print)
+        pour_more(PoursOrder(SCENE, 1, tmp_path, tmp_path / "s.sqlite"), Reporter("repeat", print))
     assert not (tmp_path / "s.sqlite").exists()
 
 
@@ -120,5 +126,5 @@ def test_cut_off_it_ends_in_order_and_keeps_what_is_there(tmp_path):
     process.communicate(timeout=60)
     assert process.returncode == 130
     kept = Store(store, pouring=False)
-    assert 2 <= len(kept.pours_of(SCENE)) < 200
+    assert 2 <= len(list(kept.pours_of(SCENE))) < 200
     kept.close()

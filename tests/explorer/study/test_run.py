@@ -11,6 +11,7 @@ import pytest
 from doe.pour_runner import TRIES
 from doe.studies.study_result import OWN_STAGES, Stages
 from explorer.background.output_folder import kept_for_one
+from explorer.background.reporter import LOG
 from explorer.photograph.target import FOLDER, load_target, remove_target
 from explorer.report import folder
 from explorer.study import run as study_run
@@ -20,6 +21,7 @@ from tests.doe.formula_runner import FormulaRunner
 from tests.doe.studies.test_campaign import planted
 from tests.explorer import reported_studies
 from tests.explorer.command_line import explorer
+from tests.explorer.events import checked_events, lines_of
 from tests.explorer.viewer.study_panel_at_hand import study_with_own_profiles
 
 pytestmark = pytest.mark.usefixtures("unprinted")
@@ -68,7 +70,7 @@ def test_two_studies_in_one_folder_are_refused_and_the_first_is_left_alone(tmp_p
 
 @pytest.mark.usefixtures("formula")
 def test_a_study_leaves_result_and_reports(tmp_path):
-    done = calibrate(tmp_path)
+    done = calibrate(tmp_path, "--json")
     assert done.exit_code == 0, done.output
     result = json.loads((tmp_path / "out" / "result.json").read_text())
     keys = {"screening", "ascent", "surface", "optimum", "verification", "assumptions", "runs", "timing", "versions"}
@@ -78,7 +80,11 @@ def test_a_study_leaves_result_and_reports(tmp_path):
     assert result["runs"]["total"] == len(result["runs"]["list"])
     for name in ("report.html", "report.md"):
         assert (tmp_path / "out" / name).stat().st_size > 1000
-    events = [json.loads(line) for line in (tmp_path / "out" / "progress.jsonl").read_text().splitlines()]
+    events = checked_events(done.stdout)
+    assert events == lines_of((tmp_path / "out" / "progress.jsonl").read_text())
+    assert (events[-1]["outcome"], events[-1]["result"]) == ("finished", str(tmp_path / "out" / "result.json"))
+    assert "report.html" in done.stderr
+    assert {line["run_id"] for line in lines_of((tmp_path / "out" / LOG).read_text())} == {events[0]["run_id"]}
     assert [event["stage"] for event in events if event["line"]] == list(OWN_STAGES)
     assert events[-1]["done"] == events[-1]["planned"] == result["runs"]["total"]
     assert list(events[0]["stages"]) == list(OWN_STAGES)

@@ -58,8 +58,8 @@ def kill(process):
     process.join()
 
 
-def test_the_pour_of_a_killed_worker_is_poured_by_another(taichi, pool):
-    """Killed between two queues, and while it pours; the bits are those of this process."""
+def test_the_pour_of_a_killed_worker_is_poured_by_another(taichi, pool, caplog):
+    """Killed between two queues, and while it pours; the bits are those of this process, and the loss is logged."""
     jobs = [Job(HEAP, seed, tag=seed) for seed in range(3)]
     list(pool.run_queue(deque(jobs[:1]), [HEAP]))
     kill(pool._processes[0][0])
@@ -69,6 +69,7 @@ def test_the_pour_of_a_killed_worker_is_poured_by_another(taichi, pool):
             kill(pool._processes[1][0])
         apart[job.tag] = record
     assert sorted(apart) == [0, 1, 2]
+    assert any("a worker process has ended (1 of 3 losses)" in record.getMessage() for record in caplog.records)
     for seed, record in run_pours(jobs, worlds=2):
         np.testing.assert_array_equal(apart[seed].bodies.position, record.bodies.position)
 
