@@ -8,7 +8,7 @@ reads photographs.
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from solver.assets import AssetNotFoundError, asset_path
+from solver.assets import AssetNotFoundError, asset_path, own_path
 from solver.effects import EFFECTS, SetUpEffect, Telltale
 from solver.npz import NpzError, npz_arrays
 from solver.observables import OBSERVABLES, Value, observable_names, observables_in, observe
@@ -42,6 +42,7 @@ from solver.scenes.material_file import (
     NumericsTable,
     RigTable,
     Settings,
+    files_named_in,
     is_material,
     load_material,
     with_set_up,
@@ -176,6 +177,7 @@ __all__ = [
     "checked",
     "coarsened",
     "executor",
+    "files_named_in",
     "frame_of",
     "height_map",
     "instance_of",
@@ -191,6 +193,7 @@ __all__ = [
     "observe_scan",
     "one_of",
     "open_picture",
+    "own_path",
     "packed",
     "parameters",
     "parse_quantity",
