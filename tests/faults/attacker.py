@@ -4,11 +4,14 @@ It speaks viser's protocol by itself, message by message, and reads from the pag
 """
 
 import asyncio
+import gc
 import logging
 import threading
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any
+from unittest import mock
 
 import msgspec
 import viser
@@ -17,7 +20,13 @@ from viser import _messages
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
+from explorer.diagnosis.process import DiagnoseProcess
+from explorer.viewer import incoming, page
+from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.shell.channel import ShellChannel
 from tests.explorer.test_session import wait_for
+from tests.explorer.viewer.page_session import page_of
+from tests.explorer.viewer.test_page import SOURCE, Session
 
 CAMERA = {
     "type": "ViewerCameraMessage",
@@ -191,8 +200,100 @@ NO_MESSAGES = (
 
 
 @contextmanager
-def listening(server, capture):
-    """What goes wrong in the server meanwhile; ``capture``: pytest's ``capfd``."""
+def attacked_page(data):
+    """A page whose loop runs, without a solver, and its session. What it keeps is in the folder ``data``."""
+    channel, session, stop = ShellChannel(), Session(SOURCE), threading.Event()
+    at_once, kept = mock.patch.object(incoming, "MESSAGES_AT_ONCE", 10**9), {"return_value": data}
+    with at_once, mock.patch.object(page, "data_folder", **kept):
+        server = guarded_server("127.0.0.1", 0, "test", channel=channel)
+        shown = page_of(server, session, DiagnoseProcess(data / "diagnoses", None), data, channel)
+        loop = threading.Thread(target=shown.run, args=(stop,), daemon=True)
+        loop.start()
+        yield SimpleNamespace(server=server, page=shown, session=session, loop=loop, data=data)
+        stop.set()
+        loop.join()
+        server.stop()
+
+
+def wrong_values(server):
+    """Controls that have a value which no person could give them."""
+    for handle in list(server.gui._gui_input_handle_from_uuid.values()):
+        if isinstance(handle, viser.GuiUploadButtonHandle) or not hasattr(handle, "disabled"):
+            continue
+        value, told = list(handle.value) if isinstance(handle.value, tuple) else handle.value, handle._impl
+        if incoming.fitted(handle, value) is None or told.removed or not isinstance(told.update_cb, list):
+            yield handle.label, handle.value
+
+
+def random_messages(controls, draw, number):
+    """``number`` messages, right ones with one to three changes; some are changed as bytes."""
+    for _ in range(number):
+        control = draw.choice(controls)
+        message = draw.choice(
+            (
+                {"type": "GuiUpdateMessage", "uuid": control.uuid, "updates": {"value": draw.choice((0, 0.5, "x"))}},
+                {"type": "GuiUpdateMessage", "uuid": control.uuid, "updates": {"value": draw.choice(HOSTILE)}},
+                dict(CAMERA),
+                pointer(),
+                {"type": "CommandTriggerMessage", "uuid": control.uuid},
+                start_of(control, f"{draw.random()}"[2:], draw.choice((0, 5, 10**6, 10**12))),
+                part_of(control, "x", draw.choice((0, 1, 2**40)), b"12345"),
+            )
+        )
+        if control.kind in BUTTONS and message["type"] == "GuiUpdateMessage":
+            continue  # a person may press them, and then what they are for begins
+        for _ in range(draw.randint(1, 3)):
+            key = draw.choice(sorted(message))
+            message[draw.choice((key, key, "more"))] = draw.choice((*HOSTILE, *message.values()))
+        raw = msgspec.msgpack.encode(message)
+        if draw.random() < 0.3:
+            place = draw.randrange(len(raw))
+            raw = draw.choice((raw[:place], raw[:place] + draw.randbytes(2) + raw[place + 1 :], raw + raw))
+        yield raw
+
+
+def start_of(button, transfer, size, parts=None, name="x.toml"):
+    """The announcement of a file."""
+    return {
+        "type": "FileTransferStartUpload",
+        "source_component_uuid": button.uuid,
+        "transfer_uuid": transfer,
+        "filename": name,
+        "mime_type": "",
+        "part_count": -(-size // 524_288) if parts is None else parts,
+        "size_bytes": size,
+    }
+
+
+def part_of(button, transfer, index, content):
+    """A part of a file."""
+    return {
+        "type": "FileTransferPart",
+        "source_component_uuid": button.uuid,
+        "transfer_uuid": transfer,
+        "part_index": index,
+        "content": content,
+    }
+
+
+def message_fault(attacked, draw):
+    """What is wrong with how the page takes fifty messages of one browser; None for nothing."""
+    attacker = Attacker(attacked.server)
+    controls = attacker.controls()
+    with listening(attacked.server) as heard:
+        for raw in random_messages(controls, draw, 50):
+            attacker.send_raw(raw)
+        attacker.settle()
+    attacker.close()
+    wrong = [*heard.lines, *map(str, wrong_values(attacked.server))]
+    if not attacked.loop.is_alive():
+        wrong.append("the page's loop has ended")
+    return "; ".join(wrong) or None
+
+
+@contextmanager
+def listening(server, capture=None):
+    """What goes wrong in the server meanwhile; ``capture``: pytest's ``capfd``, where what is printed counts too."""
     heard, loop = Heard(), server._event_loop
 
     class Handler(logging.Handler):
@@ -205,18 +306,17 @@ def listening(server, capture):
     handler = Handler(level=logging.WARNING)
     logging.getLogger().addHandler(handler)
     loop.set_exception_handler(of_a_task)
-    capture.readouterr()
+    if capture is not None:
+        capture.readouterr()
     try:
         yield heard
     finally:
         logging.getLogger().removeHandler(handler)
 
-        async def nothing():
-            import gc
-
+        async def collect():
             gc.collect()  # a task that failed is told when it is collected
 
-        asyncio.run_coroutine_threadsafe(nothing(), loop).result(30)
+        asyncio.run_coroutine_threadsafe(collect(), loop).result(30)
         loop.set_exception_handler(None)
-        out, err = capture.readouterr()
-        heard.lines += [text for text in (out, err) if "Traceback" in text]
+        printed = capture.readouterr() if capture is not None else ()
+        heard.lines += [text for text in printed if "Traceback" in text]

@@ -15,7 +15,6 @@ from viser import _messages
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from explorer.diagnosis.process import DiagnoseProcess
 from explorer.errors import CommandError
 from explorer.live.messages import SessionState
 from explorer.viewer import guarded_server as guard
@@ -28,9 +27,16 @@ from explorer.viewer.shell.channel import PATH, ShellChannel
 from explorer.viewer.shell.web_pages import WebPages
 from solver.scenes.scene import check, parameters, value
 from tests.explorer.test_session import wait_for
-from tests.explorer.viewer.page_session import page_of
-from tests.explorer.viewer.test_page import SOURCE, Session
-from tests.faults.attacker import NO_MESSAGES, Attacker, hostile_messages, listening
+from tests.faults.attacker import (
+    NO_MESSAGES,
+    Attacker,
+    attacked_page,
+    hostile_messages,
+    listening,
+    part_of,
+    start_of,
+    wrong_values,
+)
 
 TOKEN = "0123456789abcdef"
 
@@ -38,18 +44,8 @@ TOKEN = "0123456789abcdef"
 @pytest.fixture(scope="module")
 def attacked(tmp_path_factory):
     """A page whose loop runs, and its session; it reads as fast as it can."""
-    data, channel, session, stop = tmp_path_factory.mktemp("data"), ShellChannel(), Session(SOURCE), threading.Event()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(incoming, "MESSAGES_AT_ONCE", 10**9)
-        patch.setattr("explorer.viewer.page.data_folder", lambda: data)
-        server = guarded_server("127.0.0.1", 0, "test", channel=channel)
-        page = page_of(server, session, DiagnoseProcess(data / "diagnoses", None), data, channel)
-        loop = threading.Thread(target=page.run, args=(stop,))
-        loop.start()
-        yield SimpleNamespace(server=server, page=page, session=session, loop=loop, data=data)
-        stop.set()
-        loop.join()
-        server.stop()
+    with attacked_page(tmp_path_factory.mktemp("data")) as page:
+        yield page
 
 
 @pytest.fixture
@@ -67,20 +63,6 @@ def carried_out(attacked):
     done = threading.Event()
     attacked.page._actions.post(done.set)
     assert done.wait(60.0)
-
-
-def wrong_values(server):
-    """Controls that have a value which no person could give them."""
-    for handle in server.gui._gui_input_handle_from_uuid.values():
-        if isinstance(handle, viser.GuiUploadButtonHandle) or not hasattr(handle, "disabled"):
-            continue
-        value = list(handle.value) if isinstance(handle.value, tuple) else handle.value
-        if (
-            incoming.fitted(handle, value) is None
-            or handle._impl.removed
-            or not isinstance(handle._impl.update_cb, list)
-        ):
-            yield handle.label, handle.value
 
 
 def test_no_message_reaches_the_solver_out_of_bounds_or_breaks_anything(attacked, attacker, capfd):
@@ -122,29 +104,6 @@ def test_nothing_of_one_browser_is_kept_for_the_others(attacked, attacker):
     kept = [one for one in list(buffer.values()) if isinstance(one, _messages.GuiFormDirtyMessage)]
     kept += [one for one in list(buffer.values()) if isinstance(one, _messages.FileTransferPartAck)]
     assert kept == []
-
-
-def start_of(button, transfer, size, parts=None, name="x.toml"):
-    parts = -(-size // 524_288) if parts is None else parts
-    return {
-        "type": "FileTransferStartUpload",
-        "source_component_uuid": button.uuid,
-        "transfer_uuid": transfer,
-        "filename": name,
-        "mime_type": "",
-        "part_count": parts,
-        "size_bytes": size,
-    }
-
-
-def part_of(button, transfer, index, content):
-    return {
-        "type": "FileTransferPart",
-        "source_component_uuid": button.uuid,
-        "transfer_uuid": transfer,
-        "part_index": index,
-        "content": content,
-    }
 
 
 def test_a_file_takes_no_more_than_it_may(attacked, attacker):
