@@ -10,7 +10,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from solver.assets import AssetNotFoundError, asset_path
+from solver.assets import AssetNotFoundError, asset_path, own_path
 from solver.effects import EFFECTS, SetUpEffect, Telltale
 from solver.npz import NpzError, npz_arrays
 from solver.observables import OBSERVABLES, Value, observable_names, observables_in, observe
@@ -44,6 +44,7 @@ from solver.scenes.material_file import (
     NumericsTable,
     RigTable,
     Settings,
+    files_named_in,
     is_material,
     load_material,
     with_set_up,
@@ -203,6 +204,7 @@ __all__ = [
     "checked",
     "coarsened",
     "executor",
+    "files_named_in",
     "frame_of",
     "height_map",
     "instance_of",
@@ -218,6 +220,7 @@ __all__ = [
     "observe_scan",
     "one_of",
     "open_picture",
+    "own_path",
     "packed",
     "parameters",
     "parse_quantity",

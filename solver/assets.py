@@ -73,7 +73,7 @@ def asset_path(kind: AssetKind, name: str, *, relative_to: Path | None = None) -
     """
     if kind not in _SUFFIX:
         raise ValueError(f"asset kind {kind!r} is unknown; allowed: {', '.join(get_args(AssetKind))}")
-    own = (relative_to or Path()) / Path(name).expanduser()
+    own = (relative_to or Path()) / own_path(name)
     if own.is_file():
         return own
     shipped = shipped_assets(kind)
@@ -85,12 +85,20 @@ def asset_path(kind: AssetKind, name: str, *, relative_to: Path | None = None) -
     )
 
 
+def own_path(name: str) -> Path:
+    """The path that a person named, ``~`` being their folder; ``~somebody`` who is not there stays what it is."""
+    try:
+        return Path(name).expanduser()
+    except RuntimeError:
+        return Path(name)
+
+
 def measurement_folder(name: str) -> Path:
     """Folder of a measured data set: the user's own by its path, or a shipped one by its name.
 
     Raises AssetNotFoundError where neither exists; the message lists the shipped names.
     """
-    own = Path(name).expanduser()
+    own = own_path(name)
     if own.is_dir():
         return own
     shipped = shipped_measurements()

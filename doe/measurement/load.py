@@ -27,8 +27,10 @@ from solver import (
     TomlTable,
     all_names,
     checked,
+    files_named_in,
     load_material,
     named,
+    own_path,
     parse_quantity,
     read_toml,
 )  # fmt: skip
@@ -62,10 +64,53 @@ def load_measurement(folder: Path) -> Measurement:
         raise MeasurementError(f"{folder}: no such folder")
     path = folder / FILE
     with _naming(path):
-        return _read(folder, read_toml(path))
+        table = read_toml(path)
+        outside = [f"{key}: {file} is outside the folder" for key, file in outside_files(folder, table)]
+        return _read(folder, table, outside)
 
 
-def _read(folder: Path, table: Settings) -> Measurement:
+def outside_files(folder: Path, table: Mapping[str, Any]) -> Iterator[tuple[str, Path]]:
+    """What reading the data set in ``folder`` would open elsewhere, but for what is shipped: by a path or by a link.
+
+    Args:
+        folder: where ``measurement.toml`` is.
+        table: what it holds, be it well-formed or not.
+
+    Yields a key of that file, or the name of a link in the folder, and the file.
+    """
+    root = folder.resolve()
+    # One after the other: what is outside need not be opened to be told.
+    for key, file in _named_files(folder, table):
+        if "\0" not in str(file) and not (found := file.resolve()).is_relative_to(root):
+            yield key, found
+
+
+def _named_files(folder: Path, table: Mapping[str, Any]) -> Iterator[tuple[str, Path]]:
+    """Every file but the shipped ones that is read beside ``measurement.toml``, and what leads there."""
+    conditions = table.get("condition")
+    tables = [entry for entry in (conditions if isinstance(conditions, list) else []) if isinstance(entry, dict)]
+    yield from (("material", file) for file in _of_material(folder, table.get("material")))
+    for entry in tables:
+        yield from (("condition.material", file) for file in _of_material(folder, entry.get("material")))
+        images = entry.get("images")
+        pictures = (
+            [one.get("file") if isinstance(one, dict) else one for one in images] if isinstance(images, list) else []
+        )
+        named = [("condition.data", entry.get("data")), *(("condition.images", picture) for picture in pictures)]
+        yield from ((key, folder / name) for key, name in named if isinstance(name, str))
+    for kind in ("piles", "scans"):
+        yield from ((f"{kind}/{file.name}", file) for file in sorted((folder / kind).glob("*")))
+
+
+def _of_material(folder: Path, name: object) -> Iterator[Path]:
+    """The file of a material that is not a shipped one, and the files that it names."""
+    path = folder / own_path(name) if isinstance(name, str) and "\0" not in name else None
+    if path is not None and path.is_file():
+        yield path
+        yield from (path.parent / file for file in files_named_in(read_toml(path)) if isinstance(file, str))
+
+
+def _read(folder: Path, table: Settings, outside: Sequence[str]) -> Measurement:
     file = checked(MeasurementFile, table)
     base = load_material(file.material, relative_to=folder)
     given = _condition_entries(file.condition)
@@ -110,7 +155,7 @@ def _read(folder: Path, table: Settings) -> Measurement:
         parameters=suited,
         conditions=tuple(conditions),
         ignored=tuple(ignored),
-        notes=(*notes, *_narrowed(measured, suited), *_assumed(base, measured)),
+        notes=(*outside, *notes, *_narrowed(measured, suited), *_assumed(base, measured)),
         cross_check=tuple(checks),
     )
 

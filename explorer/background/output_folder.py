@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 from doe.record import Document, RecordError
 from explorer.errors import CommandError
+from solver.assets import own_path
 
 Read = TypeVar("Read", bound=Document)
 
@@ -110,7 +111,7 @@ def checked_folder(text: str, name: str) -> Path:
     """The folder that a person typed, which has to hold a readable file ``name``. Raises CommandError."""
     if not text.strip():
         raise CommandError(f"name a folder that holds {name}")
-    folder = Path(text.strip()).expanduser().absolute()
+    folder = own_path(text.strip()).absolute()
     file = folder / name
     if not file.is_file():
         raise CommandError(f"{folder}: holds no {name}")

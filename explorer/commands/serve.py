@@ -10,7 +10,13 @@ import typer
 def serve(
     project: Path | None = typer.Argument(None, help="Folder of a project, as `explorer new project` makes it."),
     port: int = typer.Option(8080, min=0, max=65535, help="Port of the page; 0 takes a free one."),
-    host: str = typer.Option("127.0.0.1", help="Address to listen on."),
+    host: str = typer.Option("127.0.0.1", help="Address to listen on; one that others can reach needs a token."),
+    token: str | None = typer.Option(
+        None,
+        envvar="EXPLORER_TOKEN",
+        help="What a browser has to show, 16 characters or more. On the command line other users of this machine can "
+        "read it: better in the environment.",
+    ),
     study: str | None = typer.Option(None, help="Study for the page's calibration: file or shipped name."),
     material: str | None = typer.Option(None, help="Material to pour and calibrate: file or shipped name."),
     set_: list[str] = typer.Option([], "--set", metavar="PATH=VALUE", help="Set a parameter; may be repeated."),
@@ -36,7 +42,7 @@ def serve(
     if replay and (project or study or material or set_ or record or rerun):
         raise CommandError(f"--replay {replay}: a recording has its own material and parameters; leave the others out")
     if replay:
-        replay_page(replay, host=host, port=port)
+        replay_page(replay, host=host, port=port, token=token)
         return
     if study and material:
         raise CommandError(f"--material {material}: the study {study} has a material of its own; name one of the two")
@@ -50,5 +56,13 @@ def serve(
         opened = study_project(study or DEFAULT_STUDY)
     scene = with_settings(opened.source.scene, set_)
     serve_page(
-        opened, scene, host=host, port=port, seed=seed, store=store, record_path=record, rerun_viewer=rerun or ""
+        opened,
+        scene,
+        host=host,
+        port=port,
+        seed=seed,
+        store=store,
+        record_path=record,
+        rerun_viewer=rerun or "",
+        token=token,
     )

@@ -35,6 +35,7 @@ from explorer.report.diagnosis.wording import spelled
 from explorer.scene.text import toml_key, toml_value
 from explorer.units import code, enumeration, number, parameter_label, parameter_value, percent
 from solver import EFFECTS, Scene, Settings, checked, named, parameters, parse_quantity, pour_rig, read_toml, value
+from solver.assets import own_path
 from solver.rigs.surface import Revolved, SurfacePose
 
 ORDER, SCHEMA = "follow_up.json", 1
@@ -231,7 +232,7 @@ def _uncertainty(table: Settings, condition: Condition) -> dict[str, Any]:
 
 def copied_material(name: str, source: Path, folder: Path) -> str:
     """What the new file calls the material: its copy in ``folder``, or the name of a shipped one."""
-    own = source / Path(name).expanduser()
+    own = source / own_path(name)
     if not own.is_file():
         return name
     _copy_toml(own, folder / own.name)

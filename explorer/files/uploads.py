@@ -15,13 +15,12 @@ import shutil
 import stat
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from doe.measurement.load import FILE as MEASUREMENT_FILE
-from doe.measurement.load import load_measurement
+from doe.measurement.load import load_measurement, outside_files
 from explorer.errors import CommandError
 from explorer.files.output_file import write_whole, write_whole_bytes
 from explorer.scene.source import SceneSource, material_source
@@ -29,6 +28,7 @@ from explorer.scene.text import material_toml
 from explorer.shape import FIXED_UNIT, MOST_FACES_DRAWN, USUAL_UNIT, mesh_solid
 from solver.npz import ZIP_DAMAGE
 from solver.rigs import MeshFunnel
+from solver.scenes.material_file import files_named_in
 from solver.scenes.scene import Scene, check, with_rig, with_values
 from solver.shapes.mesh_file import SUFFIXES
 from solver.shapes.solid import Solid, surface_mesh
@@ -39,8 +39,6 @@ MOST_ZIP_BYTES, MOST_UNPACKED_BYTES, MOST_MEMBERS = 50_000_000, 200_000_000, 100
 LABEL = re.compile(r"[^A-Za-z0-9_-]+")
 PART = re.compile(r"[A-Za-z0-9_. -]+")
 """What a part of a path in an archive may consist of."""
-FILES = ("file", "mesh")
-"""Keys of a material file that name another file."""
 KEPT_IN_FUNNEL = ("mass", "outlet_height", "domain_half_width")
 """Parameters of the rig of before that the funnel has as well."""
 FEED_SHARE = 0.8
@@ -69,9 +67,16 @@ def read_once(name: str, content: bytes) -> Iterator[Path]:
 def unpacked_measurement(name: str, content: bytes, folder: Path) -> Path:
     """The measured data set in the archive ``content``, unpacked into a folder within ``folder`` and read once.
 
-    Raises CommandError in one line, with nothing left behind.
+    It has to be whole by itself: a path in it would be one of this machine, and not of the browser's. Raises
+    CommandError in one line, with nothing left behind.
     """
-    return unpacked_folder(name, content, folder, MEASUREMENT_FILE, load_measurement)
+
+    def read(unpacked: Path) -> None:
+        for key, path in outside_files(unpacked, read_toml(unpacked / MEASUREMENT_FILE)):
+            raise CommandError(f"{key}: {path.name[:80]!r} is outside the archive; allowed are files in it")
+        load_measurement(unpacked)
+
+    return unpacked_folder(name, content, folder, MEASUREMENT_FILE, read)
 
 
 def kept_measurements(folder: Path) -> dict[str, Path]:
@@ -216,7 +221,7 @@ def uploaded_material(name: str, content: bytes, folder: Path) -> SceneSource:
     CommandError in one line, with nothing left behind.
     """
     with _tried(name, content, folder, (".toml",)) as file:
-        for other in _files_named_in(read_toml(file)):
+        for other in files_named_in(read_toml(file)):
             raise CommandError(
                 f"names the file {str(other)[:80]!r}; allowed is a material that is whole by itself: upload its mesh "
                 "under Shape or funnel from a mesh"
@@ -224,15 +229,6 @@ def uploaded_material(name: str, content: bytes, folder: Path) -> SceneSource:
         source = material_source(str(file))
         check(source.scene)
     return source
-
-
-def _files_named_in(table: Mapping[str, Any]) -> Iterator[object]:
-    """What a parsed material file names as files, be it well-formed or not."""
-    bodies = table.get("body")
-    tables = [table.get("rig"), *(bodies if isinstance(bodies, list) else [bodies])]
-    for one in [entry for entry in tables if isinstance(entry, dict)]:
-        shape = one.get("shape")
-        yield from (inner[key] for inner in (one, shape) if isinstance(inner, dict) for key in FILES if key in inner)
 
 
 @contextmanager

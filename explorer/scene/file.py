@@ -19,7 +19,7 @@ from doe.studies.study_result import StudyResult
 from explorer.errors import CommandError
 from explorer.report.identified import settings
 from solver import ParameterError, Scene, is_material, load_material, read_toml, with_set_up, with_values
-from solver.assets import AssetKind, AssetNotFoundError, asset_path, shipped_assets
+from solver.assets import AssetKind, AssetNotFoundError, asset_path, own_path, shipped_assets
 from solver.rigs import BENCH_RIGS, RIGS
 from solver.scenes.material_file import SET_UP
 from solver.scenes.material_file import with_settings as with_values_and_rig
@@ -75,7 +75,7 @@ def named_scene(source: str, material: str | None = None) -> tuple[Scene, str]:
 
 
 def _file_of(source: str) -> Path:
-    own = Path(source).expanduser()
+    own = own_path(source)
     if own.is_file():
         return own
     stem = source.removesuffix(".toml")
@@ -146,7 +146,7 @@ def with_settings(scene: Scene, settings: Sequence[str]) -> Scene:
 
 def is_calibration(source: str) -> bool:
     """Whether ``source`` names the folder of a finished calibration."""
-    return (Path(source).expanduser() / RESULT).is_file()
+    return (own_path(source) / RESULT).is_file()
 
 
 def calibrated_scene(source: str) -> tuple[Scene, str]:
@@ -158,7 +158,7 @@ def calibrated_scene(source: str) -> tuple[Scene, str]:
     Raises CommandError for a result that is not one of `explorer calibrate`, ParameterError or AssetNotFoundError where
     its study is not there any more or has changed so that the optimum does not fit it.
     """
-    path = Path(source).expanduser() / RESULT
+    path = own_path(source) / RESULT
     try:
         result = StudyResult.from_dict(json.loads(path.read_text(encoding="utf-8")))
     except (ValueError, OSError):

@@ -10,6 +10,7 @@ from pathlib import Path
 from explorer.errors import CommandError
 from explorer.scene.file import load_scene, material_scene, study_scene
 from explorer.units import entry_unit, quantity
+from solver.assets import own_path
 from solver.params import ParameterError, parse_quantity
 from solver.scenes.material_file import with_settings
 from solver.scenes.scene import Scene, parameters, values, with_rig
@@ -66,7 +67,7 @@ def study_source(file: Path) -> SceneSource:
 
 def _named(material: str) -> str:
     """A file by its full path, a shipped material by its name."""
-    own = Path(material).expanduser()
+    own = own_path(material)
     return str(own.absolute()) if own.is_file() else material.removesuffix(".toml")
 
 

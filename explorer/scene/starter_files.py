@@ -12,7 +12,7 @@ from pathlib import Path
 from explorer.errors import CommandError
 from explorer.scene.file import load_scene, material_scene
 from solver import Parameter, Scene, is_material, parameters, read_toml, value
-from solver.assets import shipped_assets
+from solver.assets import own_path, shipped_assets
 from solver.rigs.lifting_cylinder import LiftingCylinder
 from solver.scenes.material_file import scene_from
 
@@ -51,7 +51,7 @@ def write_study(folder: Path, name: str, material: str | None) -> list[Path]:
     if study.exists():
         raise CommandError(f"{study}: exists already; choose another name")
     if material is not None:
-        named = material if _is_shipped(material) else str(Path(material).expanduser().absolute())
+        named = material if _is_shipped(material) else str(own_path(material).absolute())
         return [write_new(study, study_text(study, named, study_scene(material)))]
     own = folder / f"{name}.toml"
     if own.exists() and not is_material(read_toml(own)):

@@ -36,13 +36,13 @@ class Actions:
         self._waiting.put(action)
 
     def carry_out(self) -> str | None:
-        """Run all that waits. The line of the last input that was refused, "" if none was, None if nothing ran."""
+        """Run all that waits now. The line of the last input that was refused, "" if none was, None if nothing ran.
+
+        What comes meanwhile waits for the next call: between two of them the page is drawn, however much comes.
+        """
         notice: str | None = None
-        while True:
-            try:
-                action = self._waiting.get_nowait()
-            except queue.Empty:
-                return notice
+        for _ in range(self._waiting.qsize()):
+            action = self._waiting.get_nowait()
             try:
                 action()
                 notice = notice or ""
@@ -50,6 +50,7 @@ class Actions:
                 notice = str(error)
             except OSError as error:  # a full disk, a folder that may not be written to
                 notice = f"{error.filename or 'file'}: {error.strerror or error}"
+        return notice
 
 
 class FrameClock:

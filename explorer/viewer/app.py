@@ -42,6 +42,7 @@ def serve(
     store: Path | None = None,
     record_path: Path | None = None,
     rerun_viewer: str = "",
+    token: str | None = None,
     ready: Callable[[str], None] = print_address,
 ) -> None:
     """Serve the page of a live pour of ``scene``; blocks until SIGINT or SIGTERM (main thread only).
@@ -56,10 +57,11 @@ def serve(
         record_path: new file (``.rrd``) that the session is recorded into; a restart begins another beside
             it. All of them are named on the terminal at the end.
         rerun_viewer: address of a running rerun viewer that the session is sent to; empty: none.
+        token: what a browser has to show; None: nothing, which only a loopback address may do.
         ready: called with the address once the page can be opened.
 
     Raises:
-        PortError: the port is busy or the host is not of this machine.
+        PortError: the port is busy, the host is not of this machine, or others can reach it without a token.
         ParameterError: the scene is too big to be shown.
         CommandError: ``record_path`` cannot be a new recording.
     """
@@ -73,7 +75,7 @@ def serve(
         if rerun_viewer:
             recorders.append(ending.enter_context(closing(session_recorder(RunningViewer(rerun_viewer)))))
         pages, channel = WebPages(f"{project.title} · {LABEL}"), ShellChannel()
-        server = guarded_server(host, port, LABEL, pages, channel)
+        server = guarded_server(host, port, LABEL, pages, channel, token)
         ending.callback(server.stop)
         study = CalibrationProcess(project.study, project.studies, store, target=project.target)
         ending.callback(study.close)
@@ -88,13 +90,18 @@ def serve(
 
 
 def replay(
-    recording: Path, *, host: str = "127.0.0.1", port: int = 8080, ready: Callable[[str], None] = print_address
+    recording: Path,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    token: str | None = None,
+    ready: Callable[[str], None] = print_address,
 ) -> None:
     """Serve a page that plays ``recording``; blocks until SIGINT or SIGTERM (main thread only).
 
     Raises:
         CommandError: it is no recording of a pour.
-        PortError: the port is busy or the host is not of this machine.
+        PortError: the port is busy, the host is not of this machine, or others can reach it without a token.
     """
     # Imported here: rerun takes a second to load, and a live page needs none of it.
     from explorer.logs.recording_reader import read_recording
@@ -102,7 +109,7 @@ def replay(
 
     read = read_recording(recording)
     with stopped_by_signals() as stop, ExitStack() as ending:
-        server = guarded_server(host, port, LABEL, WebPages(f"{recording.name} · {LABEL}", around=False))
+        server = guarded_server(host, port, LABEL, WebPages(f"{recording.name} · {LABEL}", around=False), token=token)
         ending.callback(server.stop)
         page = ReplayPage(server, read, recording.name)
         ready(f"http://{address(host)}:{server.get_port()}")
@@ -110,19 +117,24 @@ def replay(
 
 
 def board(
-    folder: Path, *, host: str = "127.0.0.1", port: int = 8080, ready: Callable[[str], None] = print_address
+    folder: Path,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    token: str | None = None,
+    ready: Callable[[str], None] = print_address,
 ) -> None:
     """Serve the board of the study or diagnosis in ``folder``; blocks until SIGINT or SIGTERM (main thread only).
 
     Raises:
         CommandError: the folder holds no result, or one of another version.
-        PortError: the port is busy or the host is not of this machine.
+        PortError: the port is busy, the host is not of this machine, or others can reach it without a token.
     """
     pages = WebPages(LABEL)
     # Before the address is told: what cannot be shown is refused at once.
     found = FolderBoard(folder, pages)
     with stopped_by_signals() as stop, ExitStack() as ending:
-        server = guarded_server(host, port, LABEL, pages)
+        server = guarded_server(host, port, LABEL, pages, token=token)
         ending.callback(server.stop)
         ready(f"http://{address(host)}:{server.get_port()}/shell/board.html#{found.address}")
         while not stop.wait(FOLLOW_INTERVAL):

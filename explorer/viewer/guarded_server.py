@@ -1,26 +1,35 @@
-"""A viser server that a foreign web page cannot drive.
+"""A viser server that neither a foreign web page nor a stranger can drive.
 
-viser 1.1.1 checks neither Origin nor Host, moves to another port when one is busy, and lets any client open a
-public tunnel. All of this is closed here. The Host is checked besides the Origin because of DNS rebinding: a foreign
-page whose name has come to mean 127.0.0.1 is of the same origin as this server, but gives itself away by that name.
+viser 1.1.1 checks neither Origin nor Host, moves to another port when one is busy, lets any client open a public
+tunnel, and knows no password. All of this is closed here. The Host is checked besides the Origin because of DNS
+rebinding: a foreign page whose name has come to mean 127.0.0.1 is of the same origin as this server, but gives itself
+away by that name. Beyond this machine the page is served only to those who know its token; a browser shows it once and
+gets a cookie for it. What a browser may say after that is in :mod:`explorer.viewer.incoming`.
 
-Two private names of viser and one of ``websockets`` are used, which is why viser is pinned and a test watches each.
+Private names of viser and one of ``websockets`` are used, which is why viser is pinned and a test watches each.
 """
 
 from __future__ import annotations
 
 import contextlib
+import hmac
 import io
+import ipaddress
+import logging
 import socket
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from hashlib import sha256
 from http import HTTPStatus
+from http.cookies import CookieError, SimpleCookie
 from typing import Any
+from urllib.parse import parse_qsl, urlencode
 
 import viser
 import websockets.asyncio.server
 from viser import _messages
 
 from explorer.errors import CommandError
+from explorer.viewer.incoming import MOST_BROWSERS, MOST_MESSAGE_BYTES, MOST_QUEUED, Incoming
 from explorer.viewer.shell.channel import PATH, ShellChannel
 from explorer.viewer.shell.web_pages import WebPages
 
@@ -28,6 +37,20 @@ LOCAL_NAMES = ("127.0.0.1", "localhost", "[::1]")
 ANY_ADDRESS = ("0.0.0.0", "::", "")
 HTTP_PORT = 80
 """Browsers leave this one out of Host and Origin."""
+SHORTEST_TOKEN = 16
+"""Characters."""
+TOKEN_VARIABLE = "EXPLORER_TOKEN"
+TOKEN_KEY = "token"
+"""Name of the token in an address."""
+ASK_TOKEN = """<!doctype html><title>Token</title><meta name="viewport" content="width=device-width">
+<form><label>Token of this page <input name="token" type="password" autofocus></label> <button>Open</button></form>
+"""
+COOKIE_DAYS = 30
+ASK_AFTER, GIVE_UP_AFTER, CUT_AFTER = 20.0, 20.0, 10.0
+"""Seconds after which a browser is asked whether it still listens, in which it has to have said so, and in which it may
+say farewell: one that takes nothing of what it is sent is let go."""
+MOST_CONNECTIONS = 256
+"""Connections of any kind at one time; more are cut."""
 
 
 class PortError(CommandError):
@@ -35,42 +58,102 @@ class PortError(CommandError):
 
 
 def guarded_server(
-    host: str, port: int, label: str, pages: WebPages | None = None, channel: ShellChannel | None = None
-) -> viser.ViserServer:
+    host: str,
+    port: int,
+    label: str,
+    pages: WebPages | None = None,
+    channel: ShellChannel | None = None,
+    token: str | None = None,
+) -> GuardedServer:
     """Server on ``host`` and ``port`` (0: a free one) that accepts pages which it served itself, and no
     other.
 
     ``pages`` are served beside viser's, ``channel`` talks to what stands around its page; both under the same rules.
+    ``token``: what a browser has to show; None: nothing, where only this machine can reach the page.
 
-    Raises PortError for a port that is busy or not allowed, and for a host that is not of this machine.
+    Raises PortError for a port that is busy or not allowed, for a host that is not of this machine, and for one that
+    others can reach without a token.
     """
+    check_token(host, token)
     port = free_port(host, port)
     hosts = allowed_hosts(host, port)
     origins: Any = [f"http://{name}" for name in hosts]
     real_serve = websockets.asyncio.server.serve
+    incoming = Incoming()
 
     def serve(handler: Any, serve_host: str, serve_port: int, **options: Any) -> Any:
         async def either(connection: Any) -> None:
             if channel is not None and connection.request.path == PATH:
                 await channel.handle(connection)
             else:
-                await handler(connection)
+                await incoming.hear(connection, handler)
 
-        options["process_request"] = _for_hosts(hosts, pages, options["process_request"])
-        return real_serve(either, serve_host, serve_port, origins=origins, **options)
+        options["process_request"] = _for_hosts(hosts, token, pages, options["process_request"])
+        options |= {"max_size": MOST_MESSAGE_BYTES, "max_queue": MOST_QUEUED, "logger": _quiet_logger()}
+        options |= {"ping_interval": ASK_AFTER, "ping_timeout": GIVE_UP_AFTER, "close_timeout": CUT_AFTER}
+        return real_serve(
+            either, serve_host, serve_port, origins=origins, create_connection=BoundedConnection, **options
+        )
 
     websockets.asyncio.server.serve = serve  # type: ignore[assignment, misc]
     try:
         # viser prints a banner whatever ``verbose`` says; the address is for the caller to tell.
         with contextlib.redirect_stdout(io.StringIO()):
-            server = viser.ViserServer(host=host, port=port, label=label, verbose=False)
+            server = GuardedServer(host=host, port=port, label=label, verbose=False)
     finally:
         websockets.asyncio.server.serve = real_serve  # type: ignore[misc]
     if server.get_port() != port:
         server.stop()
         raise PortError(f"port {port} on {host} is busy; choose another one, or 0 for any free port")
-    server._websock_server.unregister_handler(_messages.ShareUrlRequest)
+    server.token = token
+    for share in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
+        server._websock_server.unregister_handler(share)
+    incoming.serve(server)
     return server
+
+
+class GuardedServer(viser.ViserServer):
+    """viser's server behind the guard; ``token``: what a browser has to show, None where it is not asked for one."""
+
+    token: str | None = None
+
+
+class BoundedConnection(websockets.asyncio.server.ServerConnection):
+    """A connection that is cut at once where there are ``MOST_CONNECTIONS`` others."""
+
+    def connection_made(self, transport: Any) -> None:
+        """Called by asyncio."""
+        super().connection_made(transport)
+        if len(self.server.handlers) > MOST_CONNECTIONS:
+            transport.abort()
+
+
+def check_token(host: str, token: str | None) -> None:
+    """Raise PortError for a host that others can reach without a token, and for a token that can be guessed."""
+    advice = f"a token of at least {SHORTEST_TOKEN} characters, such as {TOKEN_VARIABLE}=$(openssl rand -hex 16)"
+    if token is None and not is_loopback(host):
+        raise PortError(f"--host {host}: anybody in the network could open this page; it needs {advice}")
+    if token is not None and not (len(token) >= SHORTEST_TOKEN and token.isascii() and token.isprintable()):
+        raise PortError(f"--token: {len(token)} characters; allowed: {advice}")
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine reaches ``host``."""
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:  # a name, which may mean any address
+        return False
+
+
+def _quiet_logger() -> logging.Logger:
+    """Of connections that were never opened, which anybody can make, there is nothing to tell."""
+    logger = logging.getLogger("explorer.page_server")
+    logger.addFilter(_of_open_connections)
+    return logger
+
+
+def _of_open_connections(record: logging.LogRecord) -> bool:
+    return not record.getMessage().startswith(("opening handshake failed", "connection rejected"))
 
 
 def free_port(host: str, port: int) -> int:
@@ -95,18 +178,59 @@ def address(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 
 
-def _for_hosts(hosts: Sequence[str], pages: WebPages | None, answer: Any) -> Any:
-    """The answer of ``pages``, or viser's ``answer`` (to an HTTP request or the opening of a WebSocket), for ``hosts``;
-    421 for others."""
+def _for_hosts(
+    hosts: Sequence[str], token: str | None, pages: WebPages | None, answer: Any
+) -> Callable[[Any, Any], Any]:
+    """The answer of ``pages``, or viser's ``answer`` (to an HTTP request or the opening of a WebSocket), for ``hosts``
+    and whoever knows the ``token``; 421 for others, 401 and a form for those without a token."""
+    pass_ = None if token is None else hmac.new(token.encode(), b"page", sha256).hexdigest()
 
     def process_request(connection: Any, request: Any) -> Any:
         named = [name.lower() for name in request.headers.get_all("Host")]
         if len(named) != 1 or named[0] not in hosts:
             return connection.respond(HTTPStatus.MISDIRECTED_REQUEST, "This server has another name.\n")
+        if token is not None and pass_ is not None and not _shown(request, cookie_name(token), pass_):
+            return _admitted(connection, request, token, pass_)
+        if "Upgrade" in request.headers and len(connection.server.connections) >= MOST_BROWSERS:
+            return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "Too many browsers are at this page.\n")
         own = None if pages is None else pages.answer(request)
         return answer(connection, request) if own is None else own
 
     return process_request
+
+
+def cookie_name(token: str) -> str:
+    """The cookie of pages with this token, on whatever port: a recording is played on one of its own."""
+    return f"explorer_{sha256(token.encode()).hexdigest()[:8]}"
+
+
+def _shown(request: Any, name: str, pass_: str) -> bool:
+    """Whether a browser sends the cookie ``name`` that it got for the token."""
+    try:
+        cookies = SimpleCookie("; ".join(request.headers.get_all("Cookie")))
+    except CookieError:
+        return False
+    return name in cookies and hmac.compare_digest(cookies[name].value.encode(), pass_.encode())
+
+
+def _admitted(connection: Any, request: Any, token: str, pass_: str) -> Any:
+    """To an address with the token: the cookie, and the same address without it. To others: a form for it."""
+    path, _, query = request.path.partition("?")
+    asked = parse_qsl(query, keep_blank_values=True)
+    given = [value for key, value in asked if key == TOKEN_KEY]
+    if len(given) != 1 or not hmac.compare_digest(given[0].encode(), token.encode()) or "Upgrade" in request.headers:
+        response = connection.respond(HTTPStatus.UNAUTHORIZED, ASK_TOKEN)
+        del response.headers["Content-Type"]
+        response.headers["Content-Type"] = "text/html; charset=utf-8"
+    else:
+        rest = urlencode([(key, value) for key, value in asked if key != TOKEN_KEY])
+        response = connection.respond(HTTPStatus.SEE_OTHER, "")
+        # One slash: with two, what follows would be another server.
+        response.headers["Location"] = "/" + path.lstrip("/\\") + (f"?{rest}" if rest else "")
+        kept = f"Max-Age={COOKIE_DAYS * 86400}; Path=/; HttpOnly; SameSite=Lax"
+        response.headers["Set-Cookie"] = f"{cookie_name(token)}={pass_}; {kept}"
+    response.headers["Cache-Control"] = "no-store"
+    return response
 
 
 def allowed_hosts(host: str, port: int) -> list[str]:

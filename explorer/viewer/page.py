@@ -30,6 +30,7 @@ from explorer.scene.presets import data_folder
 from explorer.session import Session
 from explorer.study.process import StudyProcess
 from explorer.viewer.actions import Actions, FrameClock
+from explorer.viewer.guarded_server import GuardedServer
 from explorer.viewer.output.recording_switch import Recorder
 from explorer.viewer.panel import OFTEN, SELDOM, TABS, Now, PageContext, Panel, Place
 from explorer.viewer.panels import PANELS
@@ -54,7 +55,7 @@ class Page:
 
     def __init__(
         self,
-        server: viser.ViserServer,
+        server: GuardedServer,
         session: Session,
         project: Project,
         study: StudyProcess,

@@ -23,6 +23,7 @@ from explorer.scene.link import pour_text
 from explorer.session import Session
 from explorer.study.process import StudyProcess
 from explorer.viewer.actions import BackgroundWork, Post
+from explorer.viewer.guarded_server import GuardedServer
 from explorer.viewer.look.look_settings import LookSettings
 from explorer.viewer.output.recording_switch import RecordingSwitch
 from explorer.viewer.pour.beside_pile import BesidePile
@@ -68,7 +69,7 @@ TABS = (CONTROLS, SET_UP, LOOK, EXPORT, POUR, CALIBRATE, DIAGNOSE, LABORATORY, R
 class PageContext:
     """What panels are made with, and what they have in common."""
 
-    server: viser.ViserServer
+    server: GuardedServer
     session: Session
     post: Post
     study: StudyProcess

@@ -25,7 +25,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from solver.assets import asset_path
+from solver.assets import asset_path, own_path
 from solver.effects import EFFECTS
 from solver.laws import CONTACT_LAWS, HertzMindlin
 from solver.params import ParameterError, declared, parse_quantity
@@ -186,6 +186,20 @@ def load_material(name: str, relative_to: Path | None = None) -> Scene:
         raise ParameterError(text if text.startswith(str(path)) else f"{path}: {text}") from None
 
 
+FILE_KEYS = ("file", "mesh")
+"""Keys of a material file that name another file."""
+
+
+def files_named_in(table: Mapping[str, Any]) -> Iterator[object]:
+    """What a parsed material file names as files, be it well-formed or not."""
+    bodies = table.get("body")
+    tables = [table.get("rig"), *(bodies if isinstance(bodies, list) else [bodies])]
+    for one in [entry for entry in tables if isinstance(entry, dict)]:
+        shape = one.get("shape")
+        both = [inner for inner in (one, shape) if isinstance(inner, dict)]
+        yield from (inner[key] for inner in both for key in FILE_KEYS if key in inner)
+
+
 def is_material(table: dict[str, Any]) -> bool:
     """Whether a parsed TOML file is a material: only those have materials or bodies."""
     return "materials" in table or "body" in table
@@ -231,7 +245,7 @@ def with_set_up(scene: Scene, table: Mapping[str, Any], folder: Path | None = No
         if not isinstance(entries, dict):
             raise ParameterError(f"{kind}: a table is needed, not {entries!r}")
         values |= dict(_by_path(kind, entries))
-    if folder is not None and (own := folder / Path(str(values.get(MESH, ""))).expanduser()).is_file():
+    if folder is not None and (own := folder / own_path(str(values.get(MESH, "")))).is_file():
         values[MESH] = str(own)
     return with_settings(scene, values)
 

@@ -84,6 +84,8 @@ def _parts(file: str) -> list[trimesh.Trimesh]:
     parts = [part for part in found if isinstance(part, trimesh.Trimesh) and len(part.faces) > 0]
     if not parts:
         raise MeshFileError("holds no faces")
+    if not all(part.faces.min() >= 0 and part.faces.max() < len(part.vertices) for part in parts):
+        raise MeshFileError("has faces of corners that it does not hold")
     if not all(np.isfinite(part.vertices).all() for part in parts):
         raise MeshFileError("holds coordinates that are not finite")
     return parts

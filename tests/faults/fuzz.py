@@ -1,13 +1,15 @@
-"""Files that are damaged, foreign or hostile, read by every parser: `make fuzz`.
+"""Files that are damaged, foreign or hostile, read by every parser; command lines; messages to the page: `make fuzz`.
 
     python -m tests.faults.fuzz --inputs 500 --seed 1 [--only material]
 
-A shipped file is changed at random (bits and blocks of any file; numbers, names and lines of a text), and read as the
+A good file is changed at random (bits and blocks of any file; numbers, names and lines of a text), and read as the
 program would. Good ends are a result, or an error that is one line for the user. A fault is anything else: an exception
 of another kind, a message of several lines, more than ``PATIENCE`` of time, a file that appears outside the folder.
+Command lines are those of tests/faults/command_lines.py, messages those of tests/faults/attacker.py.
 """
 
 import argparse
+import atexit
 import contextlib
 import random
 import re
@@ -17,9 +19,11 @@ import signal
 import tempfile
 import traceback
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 from doe.laboratory import TESTS
 from doe.laboratory.analysis import analyse
@@ -36,10 +40,14 @@ from solver.assets import asset_path
 from solver.photograph import open_picture, read_photograph
 from solver.pours.raw_pour import unpacked
 from tests.doe.test_store import RUN
+from tests.faults.command_lines import command_fault, command_line
+from tests.faults.seeds import meshes, pictures, recordings
 
 ROOT = Path(__file__).parents[2]
 ASSETS = ROOT / "assets"
 _place = tempfile.TemporaryDirectory()
+_open = ExitStack()
+atexit.register(_open.close)
 PATIENCE = 20
 """[s] in which a file of the size of a shipped one has to be read or refused."""
 MEMORY = 2**31
@@ -58,6 +66,8 @@ class Parser:
 
     seeds: tuple[Path, ...]
     read: Callable[[Path], object]
+    make: Callable[[], tuple[Path, ...]] | None = None
+    """Makes the seeds where none are shipped."""
 
 
 def _stored(path: Path) -> None:
@@ -76,6 +86,13 @@ def _a_store() -> Path:
     store.add(RUN)
     store.close()
     return path
+
+
+def _recording(path: Path) -> None:
+    # Imported here: rerun takes a second to load.
+    from explorer.logs.recording_reader import read_recording
+
+    read_recording(path)
 
 
 def _lab(test: str) -> Callable[[Path], object]:
@@ -99,6 +116,9 @@ PARSERS = {
     "photograph": Parser(_files("assets/photographs/cone*.jpg"), lambda p: read_photograph(open_picture(p))),
     "mesh": Parser(_files("assets/meshes/*.stl"), lambda p: mesh_solid(p, "mm", "--unit")),
     "raw pour": Parser(_files("tests/doe/raw_pours/*.npz"), lambda p: unpacked(p.read_bytes())),
+    "picture": Parser((), lambda p: read_photograph(open_picture(p)), pictures),
+    "mesh of every format": Parser((), lambda p: mesh_solid(p, "mm", "--unit"), meshes),
+    "recording": Parser((), _recording, recordings),
     "store": Parser((_a_store(),), _stored),
     **{
         f"readings of {test}": Parser((asset_path("laboratory", test),), _lab(test))
@@ -179,7 +199,7 @@ def _in_time() -> Iterator[None]:
 def fault_of(parser: Parser, seed: str) -> str | None:
     """What is wrong with how ``parser`` takes the input that ``seed`` makes; None for nothing."""
     draw = random.Random(seed)
-    source = draw.choice(parser.seeds)
+    source = draw.choice(parser.make() if parser.make else parser.seeds)
     with tempfile.TemporaryDirectory() as place:
         copy = Path(place, source.name)
         if source.is_dir():
@@ -198,21 +218,55 @@ def fault_of(parser: Parser, seed: str) -> str | None:
     return None
 
 
+def line_fault(seed: str) -> str | None:
+    """What is wrong with how the command line that ``seed`` makes ends; None for nothing."""
+    with tempfile.TemporaryDirectory() as place:
+        try:
+            with _in_time():
+                return command_fault(command_line(random.Random(seed)), Path(place))
+        except TimeoutError as error:
+            return f"{command_line(random.Random(seed))}: {error}"
+
+
+@cache
+def _a_page() -> Any:
+    """A page for all messages, which is gone with this process."""
+    # Imported here: it loads the page, and most campaigns need none.
+    from tests.faults.attacker import attacked_page
+
+    return _open.enter_context(attacked_page(Path(_place.name)))
+
+
+def page_fault(seed: str) -> str | None:
+    """What is wrong with how the page takes the fifty messages that ``seed`` makes; None for nothing."""
+    from tests.faults.attacker import message_fault
+
+    return message_fault(_a_page(), random.Random(seed))
+
+
+CAMPAIGNS: dict[str, Callable[[str], str | None]] = {
+    **{name: partial(fault_of, parser) for name, parser in PARSERS.items()},
+    "command line": line_fault,
+    "messages to the page": page_fault,
+}
+"""What is tried → what is wrong with how the program takes the input that a seed makes."""
+
+
 def main() -> int:
     """Read so many inputs by each parser; 1 if one of them was taken badly."""
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("--inputs", type=int, default=500, help="inputs of each parser")
     asked.add_argument("--seed", type=int, default=1)
-    asked.add_argument("--only", choices=list(PARSERS))
+    asked.add_argument("--only", choices=list(CAMPAIGNS))
     order = asked.parse_args()
     taken = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     tried, faults = 0, 0
-    for name, parser in PARSERS.items():
+    for name, fault_from in CAMPAIGNS.items():
         if order.only not in (None, name):
             continue
         for number in range(order.inputs):
             seed = f"{name} {order.seed} {number}"
-            if (fault := fault_of(parser, seed)) is not None:
+            if (fault := fault_from(seed)) is not None:
                 faults += 1
                 print(f"{seed}: {fault}", flush=True)
             tried += 1
@@ -222,7 +276,7 @@ def main() -> int:
         faults += 1
         print(f"memory: {grown / 1e9:.1f} GB beside what the program had taken")
     print(
-        f"{tried} inputs of {len(PARSERS)} parsers, seed {order.seed}: {faults} faults, memory + {grown / 1e6:.0f} MB"
+        f"{tried} inputs of {len(CAMPAIGNS)} parsers, seed {order.seed}: {faults} faults, memory + {grown / 1e6:.0f} MB"
     )
     return 1 if faults else 0
 

@@ -68,8 +68,11 @@ def rendered(client: Any, scale: int) -> npt.NDArray[np.uint8]:
         pixels: npt.NDArray[np.uint8] = client.get_render(
             round(shrink * height), round(shrink * width), transport_format="png", timeout=RENDER_WAIT
         )
-    except (RuntimeError, TimeoutError) as error:
+    # What is wrong with a picture, its reader says by errors of many kinds, and the picture is the browser's.
+    except Exception as error:
         raise CommandError(f"picture: the browser did not draw it: {' '.join(str(error).split())[:120]}") from None
+    if pixels.dtype != np.uint8 or pixels.ndim != 3 or pixels.shape[2] != 4:
+        raise CommandError("picture: the browser did not draw it in colours with transparency")
     return pixels
 
 
@@ -92,7 +95,8 @@ def bar_length(per_metre: float, width: int) -> float:
 
 def length_words(length: float) -> str:
     """A length [m] in words."""
-    return next(f"{length * per:g} {unit}" for per, unit in ((1.0, "m"), (1e2, "cm"), (1e3, "mm")) if length * per >= 1)
+    units = ((1.0, "m"), (1e2, "cm"), (1e3, "mm"), (1e6, "µm"))
+    return next((f"{length * per:g} {unit}" for per, unit in units if length * per >= 1.0 - 1e-9), f"{length:g} m")
 
 
 def composed(pixels: npt.NDArray[np.uint8], ground: str, per_metre: float, legend: Legend, unit: float) -> bytes:

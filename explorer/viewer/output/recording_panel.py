@@ -47,7 +47,7 @@ class RecordingPanel(Panel):
             "Replay here gives a link to a page for each, which opens beside this one. Recordings stay in the folder "
             "named below.",
         )
-        self._host, self._replays = page.server.get_host(), list[ReplayBeside]()
+        self._server, self._replays = page.server, list[ReplayBeside]()
         self._state = gui.add_html("")
 
         @self._switch.on_click
@@ -83,7 +83,7 @@ class RecordingPanel(Panel):
                 raise CommandError("recording: a web page replays itself; download and open it")
             self._background.start(
                 "reading the recording",
-                lambda: [ReplayBeside(path, self._host) for path in pours],
+                lambda: [ReplayBeside(path, self._server.get_host(), self._server.token) for path in pours],
                 self._show_replays,
             )
         elif chosen == DOWNLOAD and client is not None:
@@ -108,17 +108,19 @@ class RecordingPanel(Panel):
 class ReplayBeside:
     """Serves ``recording`` on a free port of ``host`` until it is closed; plays when the first browser comes.
 
+    ``token``: that of the page which it stands beside.
+
     Raises :class:`explorer.errors.CommandError` where it cannot be read.
     """
 
-    def __init__(self, recording: Path, host: str) -> None:
+    def __init__(self, recording: Path, host: str, token: str | None) -> None:
         # Imported here: rerun takes a second to load, and most sessions are not replayed.
         from explorer.logs.recording_reader import read_recording
         from explorer.viewer.replay.replay_page import ReplayPage
 
         read = read_recording(recording)
         self._server, self._stop = (
-            guarded_server(host, 0, "Replay", WebPages("Replay", around=False)),
+            guarded_server(host, 0, "Replay", WebPages("Replay", around=False), token=token),
             threading.Event(),
         )
         page = ReplayPage(self._server, read, recording.name)

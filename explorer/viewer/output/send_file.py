@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from viser import _messages
+
 from explorer.errors import CommandError
 
 MOST_SENT = 200_000_000
@@ -13,7 +15,15 @@ MOST_SENT = 200_000_000
 
 
 def send_file(client: Any, name: str, content: bytes) -> None:
-    """Have a browser keep ``content`` as a file called ``name``."""
+    """Have a browser keep ``content`` as a file called ``name``.
+
+    Raises CommandError while one before it is on its way: a browser that takes none would have them pile up here.
+    """
+    buffer = client._websock_connection.get_message_buffer()
+    with buffer.buffer_lock:
+        waiting = any(isinstance(one, _messages.FileTransferPart) for one in buffer.message_from_id.values())
+    if waiting:
+        raise CommandError(f"{name}: this browser has not received the file before it yet")
     # At once: otherwise a person gets a link in a notification, and has to press it.
     client.send_file_download(name, content, save_immediately=True)
 

@@ -16,6 +16,8 @@ from typing import Any
 import websockets
 from websockets.asyncio.server import ServerConnection
 
+from explorer.viewer.incoming import Pace
+
 PATH = "/shell/channel"
 LONGEST_COMMAND = 2500
 """Characters of a command: a link's text with what stands around it."""
@@ -66,7 +68,7 @@ class ShellChannel:
             return
         try:
             command = json.loads(message)
-        except ValueError:
+        except (ValueError, RecursionError):
             return
         act = self._acts.get(str(command.get("do"))) if isinstance(command, dict) else None
         if act is not None:
@@ -80,8 +82,10 @@ class ShellChannel:
         with self._lock:
             self._waiting[connection] = asyncio.get_running_loop(), changed
         teller = asyncio.create_task(self._tell_changes(connection, changed))
+        pace = Pace()
         try:
             async for message in connection:
+                await pace.wait()
                 self.take(message)
         except websockets.ConnectionClosed:
             pass

@@ -6,6 +6,7 @@ import re
 import urllib.error
 import urllib.request
 import zipfile
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -49,6 +50,8 @@ class Browser:
 
     def __init__(self, error=None):
         self.sent, self.error = {}, error
+        nothing = SimpleNamespace(buffer_lock=nullcontext(), message_from_id={})
+        self._websock_connection = SimpleNamespace(get_message_buffer=lambda: nothing)
         self.camera = SimpleNamespace(
             image_height=90, image_width=5120, position=np.array([0.0, -0.5, 0.0]), look_at=np.zeros(3), fov=0.6
         )
