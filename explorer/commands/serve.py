@@ -24,6 +24,9 @@ def serve(
     rerun: str | None = typer.Option(
         None, metavar="URL", help="Send the session to a running rerun viewer: `rerun` tells its URL."
     ),
+    scheduler: str = typer.Option(
+        "", metavar="tcp://…", help="Studies, diagnoses and further pours on the workers of this Dask scheduler."
+    ),
     replay: Path | None = typer.Option(None, metavar="FILE.rrd", help="Play a recording on the page instead."),
 ) -> None:
     """Open the page: watch a pour, turn its parameters, calibrate; or play a recording."""
@@ -32,8 +35,10 @@ def serve(
     from explorer.scene.file import DEFAULT_STUDY, with_settings
     from explorer.viewer.app import replay as replay_page
     from explorer.viewer.app import serve as serve_page
+    from solver import check_scheduler
 
-    if replay and (project or study or material or set_ or record or rerun):
+    check_scheduler(scheduler)
+    if replay and (project or study or material or set_ or record or rerun or scheduler):
         raise CommandError(f"--replay {replay}: a recording has its own material and parameters; leave the others out")
     if replay:
         replay_page(replay, host=host, port=port)
@@ -50,5 +55,13 @@ def serve(
         opened = study_project(study or DEFAULT_STUDY)
     scene = with_settings(opened.source.scene, set_)
     serve_page(
-        opened, scene, host=host, port=port, seed=seed, store=store, record_path=record, rerun_viewer=rerun or ""
+        opened,
+        scene,
+        host=host,
+        port=port,
+        seed=seed,
+        store=store,
+        record_path=record,
+        rerun_viewer=rerun or "",
+        scheduler=scheduler,
     )

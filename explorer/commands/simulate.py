@@ -69,12 +69,16 @@ def simulate(
     from explorer.files.run_result import result_of
     from explorer.scene.file import load_scene, with_settings
     from explorer.tables.pours import RunTable, bench_data, bench_text, write_bench
-    from solver import Job, executor, run_pours
+    from solver import Job, check_scheduler, executor, run_pours
     from solver.arch import chosen
     from solver.pours.checkpoint import read_checkpoint
     from solver.rigs import BENCH_RIGS
     from solver.single_body import run_bench_test
 
+    check_scheduler(scheduler, threads)
+    if scheduler and (record or checkpoint):
+        watched = "--record" if record else "--checkpoint"
+        raise CommandError(f"{watched}: is for pours that run on this machine; leave --scheduler out")
     if replicates > 1 and (checkpoint or resume):
         raise CommandError("--checkpoint and --resume are for one pour, not for --replicates")
     interrupted = read_checkpoint(resume) if resume else None
@@ -87,9 +91,10 @@ def simulate(
         from explorer.logs.recording import recorded_lines
     scene = with_settings(load_scene(source, material), set_)
     if scene.rig.name in BENCH_RIGS:
-        if record or checkpoint or resume or replicates > 1:
+        if record or checkpoint or resume or replicates > 1 or scheduler:
             raise CommandError(
-                f"{scene.rig.name} is a bench test: --record, --checkpoint, --resume and --replicates are for pours"
+                f"{scene.rig.name} is a bench test: --record, --checkpoint, --resume, --replicates and --scheduler are "
+                "for pours"
             )
         with ExitStack() as stack:
             folder = stack.enter_context(appearing(out)) if out else None
@@ -121,7 +126,7 @@ def simulate(
                     listener.sample(k, pour)
 
         jobs = [Job(scene, s, tag=k, interrupted=interrupted) for k, s in enumerate(seeds)]
-        if replicates > 1 and not (recorder or kept) and chosen() == "cpu":
+        if scheduler or (replicates > 1 and not (recorder or kept) and chosen() == "cpu"):
             # Nobody looks at them from within, so they run in processes of their own: in one, all wait for the slowest.
             pool = stack.enter_context(executor(min(threads or os.cpu_count() or 1, replicates), scheduler))
             ended: Iterator[tuple[int, Record]] = (

@@ -46,8 +46,11 @@ def pour_more(order: PoursOrder, say: Callable[[str], None]) -> tuple[Population
     if order.out is not None and order.out.exists() and any(order.out.iterdir()):
         raise CommandError(f"--out {order.out}: is not empty; name a new folder")
     path = order.store or default_store()
-    store = Store(path)
+    workers = min(order.threads or os.cpu_count() or 1, order.pours)
     with ExitStack() as stack:
+        # Before anything is made: perhaps no scheduler answers.
+        pool = stack.enter_context(executor(workers, order.scheduler)) if chosen() == "cpu" else None
+        store = Store(path)
         stack.callback(store.close)
         seeds = new_seeds((run.seed for run in store.pours_of(order.scene)), order.pours)
         say(f"{order.scene.title}: {order.pours} pours, seeds {', '.join(map(str, seeds))}; store {path}")
@@ -64,8 +67,6 @@ def pour_more(order: PoursOrder, say: Callable[[str], None]) -> tuple[Population
             if progress is not None:
                 progress.run(stage, run, remaining)
 
-        workers = min(order.threads or os.cpu_count() or 1, order.pours)
-        pool = stack.enter_context(executor(workers, order.scheduler)) if chosen() == "cpu" else None
         pours = pool.run_queue if pool else None
         name = order.scene.title
         runner = PourRunner(order.scene, store, name, 0, order.threads, on_run=ended, pours=pours, seeds=seeds)
