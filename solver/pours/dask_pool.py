@@ -8,6 +8,7 @@ thread: ``dask worker tcp://… --nthreads 1 --nworkers -1`` starts one per core
 
 from __future__ import annotations
 
+import logging
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -65,6 +66,8 @@ class DaskPool:
             raise SchedulerError(
                 f"--scheduler {address}: Dask is not installed; pip install 'repose-explorer[dask]'"
             ) from None
+        # Of a connection that breaks it would print a traceback; what comes of it is raised.
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         self._address = address
         try:
             self._client = Client(address, timeout=CONNECTED, set_as_default=False)
