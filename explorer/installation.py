@@ -136,11 +136,11 @@ def tell_of_solver() -> None:
     from explorer.scene.file import DEFAULT_STUDY, load_scene
     from solver.backend import kernel_folder, trial
     from solver.pours.kernel_cache import missing
-    from solver.pours.worker_pool import Rooms
+    from solver.pours.worker_pool import Room, Rooms
 
     folder = kernel_folder()
     kernels = sum(1 for _ in folder.glob("*.tic")) if folder.is_dir() else 0
-    compiled = not missing(Rooms().make([load_scene(DEFAULT_STUDY)]))
+    compiled = not missing(Rooms().make(Room.of([load_scene(DEFAULT_STUDY)])))
     trial()
     print(json.dumps(asdict(SolverTrial("", str(folder), kernels, compiled))))
 

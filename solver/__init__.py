@@ -82,7 +82,7 @@ from solver.version import PHYSICS
 if TYPE_CHECKING:
     from solver.engine.world import Batch
     from solver.photograph import PhotographedPile, PhotographError, open_picture, read_photograph
-    from solver.pours.executor import Executor, executor
+    from solver.pours.executor import Executor, check_scheduler, executor
     from solver.pours.pour import Pour
     from solver.pours.run import Job, capacity_for, run_pour, run_pours, run_queue
     from solver.pours.worker_pool import PourBrokeOff, WorkerPool, begin_worker, warm_up
@@ -101,6 +101,7 @@ _LATE = {
     "PourBrokeOff": "solver.pours.worker_pool",
     "begin_worker": "solver.pours.worker_pool",
     "capacity_for": "solver.pours.run",
+    "check_scheduler": "solver.pours.executor",
     "executor": "solver.pours.executor",
     "open_picture": "solver.photograph",
     "read_photograph": "solver.photograph",
@@ -201,6 +202,7 @@ __all__ = [
     "body_counts",
     "canonical",
     "capacity_for",
+    "check_scheduler",
     "checked",
     "coarsened",
     "executor",

@@ -67,6 +67,33 @@ class BackgroundError(CommandError):
     """A command that cannot be started or resumed; one line, fit for a user."""
 
 
+HERE = "this machine"
+
+
+class PourPlace:
+    """Where commands pour that are started from now on: on this machine, or on the workers of a Dask scheduler.
+
+    Whoever may name a scheduler makes this machine run what that scheduler sends: Dask's messages hold code. So the
+    address is given by who starts the server, and a browser can only choose between it and this machine.
+    """
+
+    def __init__(self, scheduler: str = "") -> None:
+        self.offered = (scheduler, HERE) if scheduler else (HERE,)
+        """What there is to choose from."""
+        self.chosen = self.offered[0]
+
+    def choose(self, name: str) -> None:
+        """Pour there from the next command on. Raises BackgroundError for what is not offered."""
+        if name not in self.offered:
+            raise BackgroundError(f"pour on: {name!r} is not one of {', '.join(self.offered)}")
+        self.chosen = name
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """What a command is told."""
+        return () if self.chosen == HERE else ("--scheduler", self.chosen)
+
+
 class CommandProcess:
     """One command at a time as a child process.
 

@@ -53,15 +53,21 @@ def calibrate(
     from explorer.files.output_file import write_whole
     from explorer.study import for_ci
     from explorer.study.run import StudyOrder, run_study
+    from solver import check_scheduler
 
     if not headless:
         raise CommandError("calibrate: add --headless to run here, or start it from the panel of `explorer serve`")
+    check_scheduler(scheduler, threads)
     # Before any pour: a file that is no result is told at once.
     before = for_ci.read_baseline(baseline) if baseline is not None else None
     # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished runs kept.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     one_file = record is not None and record.suffix == ".rrd"
     folder, piles = (None, record) if one_file else (record, None)
+    if scheduler and folder is not None:
+        raise CommandError(
+            f"--record {folder}: a folder takes pours of this machine; leave --scheduler out, or name a .rrd file"
+        )
     order = StudyOrder(
         study,
         profile,

@@ -36,7 +36,10 @@ def diagnose(
     """Calibrate the declared model, test what is left, name the missing effect, confirm it by fresh pours."""
     from explorer.background.reporter import reporter_of
     from explorer.diagnosis.run import DiagnoseOrder, run_diagnose
+    from solver import check_scheduler
     from solver.assets import measurement_folder
+
+    check_scheduler(scheduler, threads)
 
     # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished pours kept.
     signal.signal(signal.SIGTERM, signal.default_int_handler)

@@ -31,6 +31,9 @@ def repeat(
     from explorer.population.run import PoursOrder, pour_more
     from explorer.scene.file import load_scene, with_settings
     from explorer.tables.text_table import text_table
+    from solver import check_scheduler
+
+    check_scheduler(scheduler, threads)
 
     # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished pours kept.
     signal.signal(signal.SIGTERM, signal.default_int_handler)

@@ -30,6 +30,9 @@ def serve(
     rerun: str | None = typer.Option(
         None, metavar="URL", help="Send the session to a running rerun viewer: `rerun` tells its URL."
     ),
+    scheduler: str = typer.Option(
+        "", metavar="tcp://…", help="Studies, diagnoses and further pours on the workers of this Dask scheduler."
+    ),
     replay: Path | None = typer.Option(None, metavar="FILE.rrd", help="Play a recording on the page instead."),
 ) -> None:
     """Open the page: watch a pour, turn its parameters, calibrate; or play a recording."""
@@ -38,8 +41,10 @@ def serve(
     from explorer.scene.file import DEFAULT_STUDY, with_settings
     from explorer.viewer.app import replay as replay_page
     from explorer.viewer.app import serve as serve_page
+    from solver import check_scheduler
 
-    if replay and (project or study or material or set_ or record or rerun):
+    check_scheduler(scheduler)
+    if replay and (project or study or material or set_ or record or rerun or scheduler):
         raise CommandError(f"--replay {replay}: a recording has its own material and parameters; leave the others out")
     if replay:
         replay_page(replay, host=host, port=port, token=token)
@@ -65,4 +70,5 @@ def serve(
         record_path=record,
         rerun_viewer=rerun or "",
         token=token,
+        scheduler=scheduler,
     )

@@ -78,7 +78,7 @@ def simulate(
     from explorer.files.run_result import result_of
     from explorer.scene.file import load_scene, with_settings
     from explorer.tables.pours import RunTable, bench_data, bench_text, write_bench
-    from solver import Job, executor, run_pours
+    from solver import Job, check_scheduler, executor, run_pours
     from solver.arch import chosen
     from solver.pours.checkpoint import read_checkpoint
     from solver.rigs import BENCH_RIGS
@@ -86,6 +86,10 @@ def simulate(
 
     if json and events:
         raise CommandError("--json prints the result, --events what happens meanwhile; name one of them")
+    check_scheduler(scheduler, threads)
+    if scheduler and (record or checkpoint):
+        watched = "--record" if record else "--checkpoint"
+        raise CommandError(f"{watched}: is for pours that run on this machine; leave --scheduler out")
     if replicates > 1 and (checkpoint or resume):
         raise CommandError("--checkpoint and --resume are for one pour, not for --replicates")
     interrupted = read_checkpoint(resume) if resume else None
@@ -98,10 +102,10 @@ def simulate(
         from explorer.logs.recording import recorded_lines
     scene = with_settings(load_scene(source, material), set_)
     if scene.rig.name in BENCH_RIGS:
-        if record or checkpoint or resume or replicates > 1 or events:
+        if record or checkpoint or resume or replicates > 1 or events or scheduler:
             raise CommandError(
-                f"{scene.rig.name} is a bench test: --record, --checkpoint, --resume, --replicates and --events are "
-                "for pours"
+                f"{scene.rig.name} is a bench test: --record, --checkpoint, --resume, --replicates, --events and "
+                "--scheduler are for pours"
             )
         with ExitStack() as stack:
             folder = stack.enter_context(appearing(out)) if out else None
@@ -144,7 +148,7 @@ def simulate(
                 within.sample(pour.time)
 
         jobs = [Job(scene, s, tag=k, interrupted=interrupted) for k, s in enumerate(seeds)]
-        if replicates > 1 and not (recorder or kept) and chosen() == "cpu":
+        if scheduler or (replicates > 1 and not (recorder or kept) and chosen() == "cpu"):
             # Nobody looks at them from within, so they run in processes of their own: in one, all wait for the slowest.
             pool = stack.enter_context(executor(min(threads or os.cpu_count() or 1, replicates), scheduler))
             pours: Iterator[tuple[int, Record]] = (

@@ -40,6 +40,10 @@ def validate_diagnosis(
     from explorer.background.reporter import reporter_of
     from explorer.errors import CommandError
     from explorer.tables.validation import campaign_text
+    from solver import check_scheduler
+
+    # Here --threads is for what stays on this machine: verdicts, and pours with an effect that the library lacks.
+    check_scheduler(scheduler)
 
     number, _, of = shard.partition("/")
     if not (number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of)):

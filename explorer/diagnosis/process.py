@@ -12,7 +12,14 @@ from typing import Protocol
 
 from doe.diagnose.budget import scaled_budget
 from doe.measurement.load import load_measurement
-from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess, CommandStatus, WaitingLine
+from explorer.background.command_process import (
+    PROGRAM,
+    BackgroundError,
+    CommandProcess,
+    CommandStatus,
+    PourPlace,
+    WaitingLine,
+)
 from explorer.background.output_folder import finished, new_folder, newest_unfinished
 from explorer.diagnosis.result import DiagnosisResult
 from solver import EFFECTS
@@ -84,10 +91,18 @@ class DiagnoseProcess:
         folder: output folders are made in here, one per start: ``<data>-<date>-<time>``.
         store: file of the store of runs; None for the default store.
         program: how the command line is called.
+        place: where diagnoses pour that are started or resumed from then on; None for this machine.
     """
 
-    def __init__(self, folder: Path, store: Path | None = None, program: Sequence[str] = PROGRAM) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        store: Path | None = None,
+        program: Sequence[str] = PROGRAM,
+        place: PourPlace | None = None,
+    ) -> None:
         self._folder, self.store = folder, store
+        self._place = place or PourPlace()
         self._process = CommandProcess("diagnosis", {0: "report"}, program)
         self._line: WaitingLine[Question] = WaitingLine(self._process, self._begin, "diagnoses")
         self.status, self.clear_queue = self._line.status, self._line.clear
@@ -151,7 +166,8 @@ class DiagnoseProcess:
         store = () if self.store is None else ("--store", str(self.store))
         effects = ("--effects", ",".join(question.effects)) if question.effects else ()
         budget = () if question.budget is None else ("--budget", str(question.budget))
-        return ["diagnose", question.data, "--out", str(out), "--apply", *effects, *budget, *store]
+        asked = (*effects, *budget, *store, *self._place.arguments)
+        return ["diagnose", question.data, "--out", str(out), "--apply", *asked]
 
 
 def _checked(question: Question) -> Question:

@@ -53,7 +53,7 @@ from explorer.files.output_file import check_new_file, write_whole
 from explorer.files.run_result import made_today, versions
 from explorer.report.diagnosis import diagnosis_report
 from explorer.report.folder import write_report
-from solver import EFFECTS, executor
+from solver import EFFECTS, Executor, executor
 
 RULE = Rule(
     prior_nothing=NOTHING,
@@ -109,13 +109,18 @@ def run_diagnose(order: DiagnoseOrder, reporter: Reporter) -> DiagnosisResult:
     if order.out.is_file() or (order.out.is_dir() and any(order.out.iterdir()) and not order.resume):
         raise CommandError(f"--out {order.out}: is not empty; name a new folder, or add --resume to go on there")
     asked = read_next(order.follow_up) if order.follow_up else None
-    with kept_for_one(order.out):
+    # The executor before anything is in the folder: perhaps no scheduler answers.
+    with kept_for_one(order.out), executor(order.threads, order.scheduler) as pool:
         reporter.begin(order.out, order.resume)
-        return _run(order, measurement, asked.measurement if asked else None, reporter)
+        return _run(order, measurement, asked.measurement if asked else None, pool, reporter)
 
 
 def _run(
-    order: DiagnoseOrder, measurement: Measurement, follow_up: Measurement | None, reporter: Reporter
+    order: DiagnoseOrder,
+    measurement: Measurement,
+    follow_up: Measurement | None,
+    pool: Executor,
+    reporter: Reporter,
 ) -> DiagnosisResult:
     """Pour, judge and write into ``order.out``, which is there and this command's alone."""
     say, names = reporter.say, order.effects or tuple(EFFECTS)
@@ -132,7 +137,6 @@ def _run(
     with ExitStack() as stack:
         store = Store(path)
         stack.callback(store.close)
-        pool = stack.enter_context(executor(order.threads, order.scheduler))
         pours = reporter.watched(pool.run_queue)
         found = run_diagnosis(
             measurement, store, pours, names, budget, progress.stage, progress.pour, order.seed, follow_up

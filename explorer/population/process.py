@@ -13,7 +13,7 @@ from pathlib import Path
 from doe.population import Population
 from doe.store import Store, default_store, observables_of
 from explorer.background.command_output import kept_scene
-from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess
+from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess, PourPlace
 from explorer.background.output_folder import new_folder
 from explorer.scene.file import material_scene
 from solver import Scene, pour_key
@@ -28,10 +28,18 @@ class PopulationProcess:
         folder: output folders and the scenes' files are made in here.
         store: file of the store of runs; None for the default store.
         program: how the command line is called.
+        place: where the next set is poured; None for this machine.
     """
 
-    def __init__(self, folder: Path, store: Path | None = None, program: Sequence[str] = PROGRAM) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        store: Path | None = None,
+        program: Sequence[str] = PROGRAM,
+        place: PourPlace | None = None,
+    ) -> None:
         self._folder, self._named, self._program = folder, store, program
+        self._place = place or PourPlace()
         self._process = CommandProcess("set of pours", {0: "poured"}, program)
         self.status, self.cancel, self.close = self._process.status, self._process.cancel, self._process.close
 
@@ -60,7 +68,8 @@ class PopulationProcess:
             raise BackgroundError("this scene has settings that no material file holds; it cannot be poured apart")
         out = new_folder(self._folder, STEM)
         store = () if self._named is None else ("--store", str(self._named))
-        self._process.start(out, ["repeat", str(file), "--pours", str(pours), "--out", str(out), *store])
+        asked = ("--pours", str(pours), "--out", str(out), *store, *self._place.arguments)
+        self._process.start(out, ["repeat", str(file), *asked])
 
 
 def populations(store: Store, scene: Scene, names: Sequence[str]) -> tuple[Population, ...]:

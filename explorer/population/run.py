@@ -49,8 +49,11 @@ def pour_more(order: PoursOrder, reporter: Reporter) -> tuple[Population, ...]:
     if order.out is not None and order.out.exists() and any(order.out.iterdir()):
         raise CommandError(f"--out {order.out}: is not empty; name a new folder")
     path = order.store or default_store()
-    store = Store(path)
+    workers = min(order.threads or os.cpu_count() or 1, order.pours)
     with ExitStack() as stack:
+        # Before anything is made: perhaps no scheduler answers.
+        pool = stack.enter_context(executor(workers, order.scheduler)) if chosen() == "cpu" else None
+        store = Store(path)
         stack.callback(store.close)
         seeds = new_seeds((run.seed for run in store.pours_of(order.scene)), order.pours)
         told = ", ".join(map(str, seeds)) if len(seeds) <= MOST_SEEDS else f"{seeds[0]} … {seeds[-1]}"
@@ -61,8 +64,6 @@ def pour_more(order: PoursOrder, reporter: Reporter) -> tuple[Population, ...]:
         progress = RunProgress(reporter, {STAGE: order.pours})
         stack.enter_context(told_of_pauses(progress.went_on))
         progress.compiling()
-        workers = min(order.threads or os.cpu_count() or 1, order.pours)
-        pool = stack.enter_context(executor(workers, order.scheduler)) if chosen() == "cpu" else None
         pours = reporter.watched(pool.run_queue if pool else partial(run_queue, threads=order.threads))
         name = order.scene.title
         runner = PourRunner(order.scene, store, name, 0, order.threads, on_run=progress.run, pours=pours, seeds=seeds)

@@ -12,7 +12,14 @@ from pathlib import Path
 from typing import Protocol
 
 from doe.studies.study import TRIES, Study, load_study, with_profile
-from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess, CommandStatus, WaitingLine
+from explorer.background.command_process import (
+    PROGRAM,
+    BackgroundError,
+    CommandProcess,
+    CommandStatus,
+    PourPlace,
+    WaitingLine,
+)
 from explorer.background.output_folder import finished, new_folder, newest_unfinished
 from explorer.background.progress import given_up
 from explorer.files.output_file import write_whole
@@ -106,6 +113,7 @@ class CalibrationProcess:
         store: file of the store of runs; None for the default store.
         program: how the command line is called.
         target: folder of the photographs that are the target of every study that is ordered while they are there.
+        place: where studies pour that are started or resumed from then on; None for this machine.
     """
 
     def __init__(
@@ -115,8 +123,10 @@ class CalibrationProcess:
         store: Path | None = None,
         program: Sequence[str] = PROGRAM,
         target: Path | None = None,
+        place: PourPlace | None = None,
     ) -> None:
         self.study_file, self._folder, self._store, self._target = study_file, folder, store, target
+        self._place = place or PourPlace()
         self._process = CommandProcess("study", ENDINGS, program)
         self._profile, self._tries = "", TRIES
         self.present: QueuedStudy | None = None
@@ -231,4 +241,4 @@ class CalibrationProcess:
         study = ["--study", str(own), "--profile", self._profile]
         study += ["--target", str(out / FOLDER)] if (out / FOLDER).is_dir() else []
         tries = () if self._tries == TRIES else ("--tries", str(self._tries))
-        return ["calibrate", "--headless", *study, "--out", str(out), *store, *tries]
+        return ["calibrate", "--headless", *study, "--out", str(out), *store, *tries, *self._place.arguments]

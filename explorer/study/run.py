@@ -11,7 +11,7 @@ import functools
 import json
 import re
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -48,7 +48,7 @@ from explorer.report import write_report
 from explorer.report.photograph import PhotographResult
 from explorer.report.set_up import set_up_of
 from explorer.study.process import PARTIAL, RESULT
-from solver import executor, pour_rig, run_queue, unpacked
+from solver import Executor, executor, pour_rig, run_queue, unpacked
 from solver.arch import chosen
 from solver.observables.made_up import estimator_bias
 from solver.observables.repose import AZIMUTHS_DEG, flank_feet, outline
@@ -109,9 +109,12 @@ def run_study(order: StudyOrder, reporter: Reporter) -> StudyResult:
     own = [study.file, *([order.target] if order.target else [])]
     if order.out.is_file() or (holds_more_than(order.out, own) and not order.resume):
         raise CommandError(f"--out {order.out}: is not empty; name a new folder, or add --resume to go on there")
-    with kept_for_one(order.out):
+    # A recorder watches pours from within; all others run in processes of their own.
+    apart = order.record is None and chosen() == "cpu"
+    # The executor before anything is in the folder: perhaps no scheduler answers.
+    with kept_for_one(order.out), executor(order.threads, order.scheduler) if apart else nullcontext() as pool:
         reporter.begin(order.out, order.resume)
-        return _run(order, study, profile, photographed, reporter)
+        return _run(order, study, profile, photographed, pool, reporter)
 
 
 def _run(
@@ -119,6 +122,7 @@ def _run(
     study: Study,
     profile: Profile,
     photographed: PhotographedTarget | None,
+    pool: Executor | None,
     reporter: Reporter,
 ) -> StudyResult:
     """Pour, analyse and write into ``order.out``, which is there and this command's alone."""
@@ -142,9 +146,6 @@ def _run(
         stack.enter_context(told_of_pauses(progress.went_on))
         stack.callback(store.close)
         recorder = stack.enter_context(_recorder(order.record)) if order.record else None
-        # A recorder watches pours from within; all others run in processes of their own.
-        poured_apart = recorder is None and chosen() == "cpu"
-        pool = stack.enter_context(executor(order.threads, order.scheduler)) if poured_apart else None
         pours = pool.run_queue if pool else functools.partial(run_queue, threads=order.threads)
         runner = PourRunner(
             study.scene,

@@ -9,6 +9,7 @@ from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from types import FrameType
 
+from explorer.background.command_process import PourPlace
 from explorer.diagnosis.process import DiagnoseProcess
 from explorer.logs.recording import RunningViewer, recorded_lines
 from explorer.project.project import Project
@@ -43,6 +44,7 @@ def serve(
     record_path: Path | None = None,
     rerun_viewer: str = "",
     token: str | None = None,
+    scheduler: str = "",
     ready: Callable[[str], None] = print_address,
 ) -> None:
     """Serve the page of a live pour of ``scene``; blocks until SIGINT or SIGTERM (main thread only).
@@ -58,6 +60,8 @@ def serve(
             it. All of them are named on the terminal at the end.
         rerun_viewer: address of a running rerun viewer that the session is sent to; empty: none.
         token: what a browser has to show; None: nothing, which only a loopback address may do.
+        scheduler: address of a Dask scheduler whose workers pour for study, diagnosis and population, unless the page
+            says otherwise; empty: none.
         ready: called with the address once the page can be opened.
 
     Raises:
@@ -77,13 +81,14 @@ def serve(
         pages, channel = WebPages(f"{project.title} · {LABEL}"), ShellChannel()
         server = guarded_server(host, port, LABEL, pages, channel, token)
         ending.callback(server.stop)
-        study = CalibrationProcess(project.study, project.studies, store, target=project.target)
+        place = PourPlace(scheduler)
+        study = CalibrationProcess(project.study, project.studies, store, target=project.target, place=place)
         ending.callback(study.close)
-        diagnosis = DiagnoseProcess(project.diagnoses, store)
+        diagnosis = DiagnoseProcess(project.diagnoses, store, place=place)
         ending.callback(diagnosis.close)
         session = ending.enter_context(closing(Session()))
         session.start(scene, seed, project.source)
-        page = Page(server, session, project, study, diagnosis, channel, pages, recorders)
+        page = Page(server, session, project, study, diagnosis, channel, pages, recorders, place)
         ending.enter_context(closing(page))
         ready(f"http://{address(host)}:{server.get_port()}")
         page.run(stop)

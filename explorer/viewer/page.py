@@ -20,7 +20,7 @@ from typing import Any, Protocol
 import viser
 from viser import _messages
 
-from explorer.background.command_process import CommandStatus
+from explorer.background.command_process import CommandStatus, PourPlace
 from explorer.diagnosis.process import DiagnosisProcess
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, SessionState, Status
@@ -63,6 +63,7 @@ class Page:
         channel: ShellChannel,
         pages: WebPages,
         recorders: Sequence[Recorder] = (),
+        place: PourPlace | None = None,
     ) -> None:
         self._server, self._session, self._recorders = server, session, tuple(recorders)
         self._events: deque[Event] = deque(maxlen=EVENTS_REMEMBERED)
@@ -78,7 +79,7 @@ class Page:
         post = self._actions.post
         self._channel = channel
         self._context = PageContext(
-            server, session, post, study, diagnosis, data_folder(), bar, project, channel, pages
+            server, session, post, study, diagnosis, data_folder(), bar, project, channel, pages, place or PourPlace()
         )
         self.panels = {panel.name: panel for panel in self._made()}
         """By name, in their order on the page."""

@@ -6,13 +6,14 @@ A new panel is a class in a file of its own and a line in ``panels.py``, or an e
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum, auto
 from functools import cached_property
 from pathlib import Path
 
 import viser
 
+from explorer.background.command_process import PourPlace
 from explorer.diagnosis.process import DiagnosisProcess
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, Status
@@ -84,6 +85,8 @@ class PageContext:
     """To the state line and the timeline."""
     pages: WebPages
     """Pages beside this one."""
+    place: PourPlace = field(default_factory=PourPlace)
+    """Where studies, diagnoses and further pours are made."""
 
     @property
     def uploads(self) -> Path:

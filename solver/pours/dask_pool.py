@@ -1,20 +1,24 @@
 """Pours on the workers of a Dask scheduler: the cores of many machines, the same bits.
 
 A task is one pour, in one world and one thread, as in :class:`solver.pours.worker_pool.WorkerPool`; Dask hands out
-tasks, sends results back as they finish, and gives those of a worker that died to another. Workers may come and go.
-Each needs this program in the same version and one thread: ``dask worker tcp://… --nthreads 1 --nworkers CORES``.
+tasks, sends results back as they finish, and gives those of a worker that died to another. Workers may come and go, and
+none need be there at first: all that a task needs it brings along. Each needs this program in the same version and one
+thread: ``dask worker tcp://… --nthreads 1 --nworkers -1`` starts one per core.
 """
 
 from __future__ import annotations
 
-import threading
+import logging
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any, Self
 
-from solver.pours.worker_pool import PourBrokeOff, Rooms, WorkerLost
+from solver.arch import chosen
+from solver.pours.executor import SchedulerError
+from solver.pours.pour_key import pour_key
+from solver.pours.worker_pool import PourBrokeOff, Room, Rooms, WorkerLost
 from solver.scenes.scene import Scene
 from solver.version import PHYSICS
 
@@ -24,14 +28,8 @@ if TYPE_CHECKING:
 
 CONNECTED = 10.0
 """[s] in which a scheduler has to answer."""
-_one_at_a_time = threading.Lock()
-_rooms = Rooms()
-_made_for: Sequence[Scene] | None = None
-"""The scenes for which a worker has made room: Dask hands the same object to every task of a queue."""
-
-
-class SchedulerError(ValueError):
-    """The scheduler cannot be used, or a worker must not be; the message is one line, fit for a user."""
+_rooms: Rooms | None = None
+"""Of this worker, once it has poured."""
 
 
 @dataclass(frozen=True)
@@ -40,17 +38,19 @@ class Program:
 
     version: str
     physics: int
+    arch: str
+    """The kind of processor that it pours on (`solver.arch`)."""
 
     @staticmethod
     def here() -> Program:
         """That of this process."""
         try:
-            return Program(version("repose-explorer"), PHYSICS)
+            return Program(version("repose-explorer"), PHYSICS, chosen())
         except PackageNotFoundError:
-            return Program("source tree", PHYSICS)
+            return Program("source tree", PHYSICS, chosen())
 
     def __str__(self) -> str:
-        return f"version {self.version}, physics {self.physics}"
+        return f"version {self.version}, physics {self.physics} on {self.arch}"
 
 
 class DaskPool:
@@ -66,6 +66,9 @@ class DaskPool:
             raise SchedulerError(
                 f"--scheduler {address}: Dask is not installed; pip install 'repose-explorer[dask]'"
             ) from None
+        # Of a connection that breaks it would print a traceback; what comes of it is raised.
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+        self._address = address
         try:
             self._client = Client(address, timeout=CONNECTED, set_as_default=False)
         except (OSError, ValueError) as error:
@@ -75,32 +78,38 @@ class DaskPool:
         """Run the jobs in ``queue`` and yield (job, record) as each finishes; jobs may be appended meanwhile.
 
         ``room`` lists scenes that any job has to fit into. Raises PourBrokeOff with a worker's error, WorkerLost where
-        workers died over the same pour again and again, SchedulerError for a worker of another version.
+        workers died over the same pour again and again, SchedulerError for a worker that would pour something else or
+        where the scheduler has ended.
         """
-        from distributed import as_completed
+        from distributed import CancelledError, as_completed
         from distributed.scheduler import KilledWorker
 
-        needed = self._client.scatter(tuple(room), broadcast=True, hash=False)
-        here = Program.here()
+        needed, here = Room.of(room), Program.here()
         finished = as_completed(loop=self._client.loop)
         asked: dict[Any, Job] = {}
         try:
             while queue or asked:
                 while queue:
                     job = queue.popleft()
-                    future = self._client.submit(_poured, job, needed, here, pure=False)
+                    key = pour_key(job.scene, job.seed)
+                    future = self._client.submit(_poured, job, needed, here, key, pure=False)
                     asked[future] = job
                     finished.add(future)
                 future = next(finished)
                 job = asked.pop(future)
-                error = future.exception()
-                if isinstance(error, KilledWorker):
-                    raise WorkerLost(f"workers have ended over the same pour, seed {job.seed} of {job.scene.title!r}")
-                if isinstance(error, SchedulerError):
-                    raise error
-                if error is not None:
+                try:
+                    record: Record = future.result()
+                except KilledWorker:
+                    raise WorkerLost(
+                        f"workers have ended over the same pour, seed {job.seed} of {job.scene.title!r}"
+                    ) from None
+                except CancelledError:
+                    raise SchedulerError(f"--scheduler {self._address}: has ended, or forgotten these pours") from None
+                except SchedulerError:
+                    raise
+                except Exception as error:
                     raise PourBrokeOff(job, error) from error
-                yield job, future.result()
+                yield job, record
         finally:
             self._client.cancel(list(asked))
 
@@ -115,21 +124,33 @@ class DaskPool:
         self.close()
 
 
-def _poured(job: Job, room: Sequence[Scene], asked_by: Program) -> Record:
-    """What a worker does."""
+def _poured(job: Job, room: Room, asked_by: Program, key: str) -> Record:
+    """What a worker does; ``key``: that of the pour where it was asked for (`pour_key`)."""
     from distributed import get_worker
 
     from solver.pours.run import run_job
 
-    global _made_for
-    if Program.here() != asked_by:
+    global _rooms
+    worker = get_worker()
+    if (own := Program.here()) != asked_by:
         raise SchedulerError(
-            f"worker {get_worker().address}: has {Program.here()}, and pours are asked for by {asked_by}; install the "
-            "same on both"
+            f"worker {worker.address}: has {own}, and pours are asked for by {asked_by}; install the same on both"
         )
-    # Taichi is one to a process; a worker of several threads pours no faster than one of a single thread.
-    with _one_at_a_time:
-        if room is not _made_for:
-            (_rooms.begin if _made_for is None else _rooms.make)(room)
-            _made_for = room
-        return run_job(_rooms.for_scene(job.scene), job)
+    # Taichi belongs to the thread that started it, and a second one would pour no faster.
+    if worker.state.nthreads != 1:
+        raise SchedulerError(
+            f"worker {worker.address}: has {worker.state.nthreads} threads; start it with --nthreads 1, and "
+            "--nworkers for as many pours at once"
+        )
+    try:
+        same = pour_key(job.scene, job.seed) == key
+    except OSError as error:
+        raise SchedulerError(f"worker {worker.address}: {error.filename}: {error.strerror}") from None
+    if not same:
+        raise SchedulerError(f"worker {worker.address}: has another version of a mesh file or of a plug-in")
+    if _rooms is None:
+        _rooms = Rooms()
+        _rooms.begin(room)
+    else:
+        _rooms.make(room)
+    return run_job(_rooms.for_scene(job.scene), job)

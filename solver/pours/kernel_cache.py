@@ -14,6 +14,7 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
@@ -48,6 +49,8 @@ def compiled_once(capacities: Sequence[Capacity]) -> Iterator[list[Capacity]]:
     """
     with ExitStack() as locks:
         kept_at_all = chosen() == "cpu" and os.environ.get("TI_OFFLINE_CACHE") != "0"
+        # A process of several threads, such as a worker of Dask, keeps none before its end: nobody is to wait for it.
+        kept_at_all = kept_at_all and threading.active_count() == 1
         absent = missing(capacities) if kept_at_all else []
         # In one order everywhere, so that no two processes wait for each other.
         places = sorted((_place(capacities[: capacities.index(one) + 1]), one) for one in absent)

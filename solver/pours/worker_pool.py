@@ -18,7 +18,7 @@ import threading
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
@@ -73,7 +73,8 @@ class WorkerPool:
         where ``LOSSES`` workers ended over the same job.
         """
         self._processes += [_worker() for _ in range(self.workers - len(self._processes))]
-        idle = [self._with_room(pipe, room) for _, pipe in self._processes]
+        needed = Room.of(room)
+        idle = [self._with_room(pipe, needed) for _, pipe in self._processes]
         busy: dict[Connection, Job] = {}
         losses: Counter[int] = Counter()
 
@@ -87,7 +88,7 @@ class WorkerPool:
             again = f"the pour with seed {job.seed} of {job.scene.title!r} is begun again by another"
             _log.warning("a worker process has ended (%d of %d losses): %s", losses[id(job)], LOSSES, again)
             queue.appendleft(job)
-            return self._with_room(self._another(pipe), room)
+            return self._with_room(self._another(pipe), needed)
 
         try:
             while queue or busy:
@@ -112,15 +113,15 @@ class WorkerPool:
             if busy:  # left before the end: what still runs is of no use
                 self.close(at_once=True)
 
-    def _with_room(self, pipe: Connection, room: Sequence[Scene]) -> Connection:
-        """``pipe``, or that of another worker where its own has ended, told of the scenes that it has to have room for.
+    def _with_room(self, pipe: Connection, room: Room) -> Connection:
+        """``pipe``, or that of another worker where its own has ended, told of the room that it has to have.
 
         Raises WorkerLost where the other one has ended, too.
         """
-        if _sent(pipe, list(room)):
+        if _sent(pipe, room):
             return pipe
         another = self._another(pipe)
-        _send(another, list(room))
+        _send(another, room)
         return another
 
     def _another(self, lost: Connection) -> Connection:
@@ -163,8 +164,9 @@ def warm_up(rooms: Sequence[Sequence[Scene]], workers: int | None = None) -> Ite
     """
     from solver.pours.kernel_cache import missing
 
+    needed = [Room.of(scenes) for scenes in rooms]
     alike: dict[tuple[Capacity, ...], list[int]] = {}
-    for k, room in enumerate(rooms):
+    for k, room in enumerate(needed):
         alike.setdefault(tuple(Rooms().make(room)), []).append(k)
     waiting = deque(alike.items())
     busy: dict[Connection, tuple[list[int], BaseProcess, float]] = {}
@@ -178,7 +180,7 @@ def warm_up(rooms: Sequence[Sequence[Scene]], workers: int | None = None) -> Ite
                 # A process for each: kernels depend on what was allocated before.
                 process, pipe = _worker()
                 busy[pipe] = numbers, process, perf_counter()
-                _send(pipe, list(rooms[numbers[0]]))
+                _send(pipe, needed[numbers[0]])
                 _send(pipe, None)
             for pipe in [ready for ready in wait(list(busy)) if isinstance(ready, Connection)] if busy else []:
                 if isinstance(error := _answer(pipe), BaseException):
@@ -271,7 +273,7 @@ def begin_worker() -> None:
 
 
 def _work(pipe: Connection) -> None:
-    """Run what comes through ``pipe``: a list of scenes makes room for them, a job is answered by its record.
+    """Run what comes through ``pipe``: a room is made, a job is answered by its record.
 
     None is answered by None: what came before is done.
     """
@@ -285,7 +287,7 @@ def _work(pipe: Connection) -> None:
         except EOFError:
             return
         try:
-            if isinstance(order, list):
+            if isinstance(order, Room):
                 (rooms.make if begun else rooms.begin)(order)
                 begun = True
                 continue
@@ -298,6 +300,25 @@ def _work(pipe: Connection) -> None:
             return
 
 
+@dataclass(frozen=True)
+class Room:
+    """What a worker has to have room for: as much as many scenes need, told by a few kilobytes."""
+
+    sizes: Capacity
+    """Of one world that holds any of the scenes."""
+    kinds: tuple[Scene, ...]
+    """A scene for each kind of kernels, by what is compiled in."""
+
+    @staticmethod
+    def of(scenes: Sequence[Scene]) -> Room:
+        """That of ``scenes``."""
+        from solver.engine.world import compiled_in
+        from solver.pours.run import sizes_for
+
+        kinds = {tuple(compiled_in([scene]).values()): scene for scene in scenes}
+        return Room(sizes_for(scenes, 1), tuple(kinds.values()))
+
+
 class Rooms:
     """A worker's batches of one world: a scene without effects runs in one that has none compiled in (0.8 of the time).
 
@@ -308,21 +329,20 @@ class Rooms:
         self._capacity: Capacity | None = None
         self._batches: dict[tuple[str, bool, bool], Batch] = {}
 
-    def make(self, scenes: Sequence[Scene]) -> list[Capacity]:
-        """Make room for ``scenes``, and leave what is there; returns the sizes of their batches."""
-        from solver.pours.run import sizes_for
-
-        needed = sizes_for(scenes, 1)
-        self._capacity = needed if self._capacity is None else self._capacity.joined(needed)
+    def make(self, room: Room) -> list[Capacity]:
+        """Make ``room``, and leave what is there; returns the sizes of its batches."""
+        self._capacity = room.sizes if self._capacity is None else self._capacity.joined(room.sizes)
         # Without effects first: kernels depend on what was allocated before.
-        return sorted({self._size(scene) for scene in scenes}, key=lambda size: (size.law, size.effects, size.sharing))
+        return sorted(
+            {self._size(scene) for scene in room.kinds}, key=lambda size: (size.law, size.effects, size.sharing)
+        )
 
-    def begin(self, scenes: Sequence[Scene]) -> None:
-        """Make room for ``scenes`` and start Taichi, with kernels that this process or another one compiles."""
+    def begin(self, room: Room) -> None:
+        """Make ``room`` and start Taichi, with kernels that this process or another one compiles."""
         from solver.pours.kernel_cache import compiled_once
 
-        sizes = self.make(scenes)
-        examples = {self._size(scene): scene for scene in scenes}
+        sizes = self.make(room)
+        examples = {self._size(scene): scene for scene in room.kinds}
         with compiled_once(sizes) as mine:
             begin_worker()
             for size in sizes:

@@ -38,6 +38,10 @@ def test_version():
     assert result.stdout.startswith("explorer ")
 
 
+AT = "tcp://127.0.0.1:9"
+"""An address where no scheduler is."""
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -61,6 +65,9 @@ def test_version():
         (["funnel", "--record", "no/such/folder/pour.rrd"], ["pour.rrd", "no folder"]),
         ([], ["RIG_OR_FILE"]),
         (["funnel", "--frobnicate"], ["--frobnicate"]),
+        (["funnel", "--scheduler", AT, "--record", "pour.rrd"], ["--record", "leave --scheduler out"]),
+        (["funnel", "--scheduler", AT, "--checkpoint", "pour.npz"], ["--checkpoint", "leave --scheduler out"]),
+        (["inclined_plane", "--scheduler", AT], ["inclined_plane is a bench test", "--scheduler"]),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else None,
 )
@@ -109,6 +116,37 @@ def test_a_folder_with_something_in_it_is_left_alone(tmp_path):
     assert precious.read_text() == "keep me"
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["simulate", "funnel", "--replicates", "2"],
+        ["calibrate", "--headless"],
+        ["diagnose", "trefoil_2"],
+        ["repeat", "funnel"],
+        ["validate-diagnosis"],
+        ["serve"],
+    ],
+    ids=lambda command: command[0],
+)
+def test_a_scheduler_that_is_none_or_of_no_use_is_refused_before_anything_is_made(command, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for address in (
+        "127.0.0.1:8786",
+        "tcp://host",
+        "tcp://host:0",
+        "tcp://host:70000",
+        "inproc://host:1",
+        "tcp://a b:1",
+    ):
+        line = refused(explorer(*command, "--scheduler", address))
+        assert line == f"--scheduler {address}: allowed: tcp://HOST:PORT, or tls, ws, wss in place of tcp"
+    if command[0] not in ("validate-diagnosis", "serve"):
+        assert "--threads 2" in refused(explorer(*command, "--scheduler", AT, "--threads", 2))
+    monkeypatch.setenv("EXPLORER_ARCH", "cuda")
+    assert "not by --arch cuda" in refused(explorer(*command, "--scheduler", AT))
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_an_existing_recording_is_left_alone(tmp_path):
     existing = tmp_path / "pour_2.rrd"
     existing.write_bytes(b"keep me")
@@ -152,9 +190,9 @@ def test_serve_passes_on_what_was_asked(monkeypatch):
     monkeypatch.setattr(
         "explorer.viewer.app.serve", lambda project, scene, **others: seen.update(others, project=project, scene=scene)
     )
-    result = explorer("serve", "--port", 0, "--seed", 7, "--set", "rig.outlet_height=70mm")
+    result = explorer("serve", "--port", 0, "--seed", 7, "--set", "rig.outlet_height=70mm", "--scheduler", AT)
     assert result.exit_code == 0, result.output
-    assert (seen["port"], seen["host"], seen["seed"]) == (0, "127.0.0.1", 7)
+    assert (seen["port"], seen["host"], seen["seed"], seen["scheduler"]) == (0, "127.0.0.1", 7, AT)
     assert value(seen["scene"], "rig.outlet_height") == 0.07
     assert seen["project"].study.name == "sunflower_extract.toml"
 

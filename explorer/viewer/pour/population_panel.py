@@ -67,7 +67,7 @@ class PopulationPanel(Panel):
     def __init__(self, page: PageContext) -> None:
         gui = page.server.gui
         self._session, self._work = page.session, BackgroundWork(page.post)
-        self._process = PopulationProcess(page.data / "pours", page.diagnosis.store)
+        self._process = PopulationProcess(page.data / "pours", page.diagnosis.store, place=page.place)
         self._doubt = AngleDoubt()
         self._scene: Scene | None = None
         self._since = self._asked_at = -math.inf

@@ -30,7 +30,14 @@ from explorer.viewer.board.diagnosis_board import (
 )
 from explorer.viewer.output.pile_recording import PileRecording
 from explorer.viewer.panel import DIAGNOSE, SELDOM, Now, PageContext, Panel
-from explorer.viewer.study.process_view import ProcessView, escaped, orders, state_markdown, waiting_markdown
+from explorer.viewer.study.process_view import (
+    PlaceChoice,
+    ProcessView,
+    escaped,
+    orders,
+    state_markdown,
+    waiting_markdown,
+)
 from explorer.viewer.study.result_chooser import ResultChooser
 from solver import EFFECTS, Scene
 from solver.assets import shipped_measurements
@@ -73,6 +80,7 @@ class DiagnosisPanel(Panel):
         )
         with gui.add_folder("Effects in question, and how much is poured", expand_by_default=False):
             self._candidates = CandidateEffects(server)
+        self._place = PlaceChoice(server, page.place, "diagnosis", post)
         acts = orders(diagnosis, self._start, self._resume, self._queue)
         self._view = ProcessView(server, "Diagnosis", acts, post)
         with gui.add_folder("Other results", expand_by_default=False):
@@ -143,6 +151,7 @@ class DiagnosisPanel(Panel):
         offered = self._offered()
         if tuple(self._data.options) != offered:
             self._data.options = offered
+        self._place.show()
         status = self._diagnosis.status()
         # How much more is poured, in this stage and after it, is decided by what comes out.
         waiting = self._diagnosis.waiting()

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import viser
 
-from explorer.background.command_process import CommandStatus
+from explorer.background.command_process import CommandStatus, PourPlace
 from explorer.background.progress import FailedRun, failures
 from explorer.outcomes import outcome_text
 from explorer.viewer.actions import Action, Post, button_group
@@ -87,6 +87,28 @@ class ProcessView:
             self._bar.animated = status.state == "running"
         if self._text.content != text:
             self._text.content = text
+
+
+class PlaceChoice:
+    """A list of where the next command of ``what`` pours; none where there is nothing to choose."""
+
+    def __init__(self, server: viser.ViserServer, place: PourPlace, what: str, post: Post) -> None:
+        self._place, self._list = place, None
+        if len(place.offered) == 1:
+            return
+        hint = f"Where the next {what} pours, also one that is resumed: on the workers of a Dask scheduler, or here."
+        self._list = server.gui.add_dropdown("Pour on", place.offered, initial_value=place.chosen, hint=hint)
+
+        @self._list.on_update
+        def _(event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
+            if event.client_id is not None:  # not what the panel itself sets
+                sent = str(event.target.value)
+                post(lambda: place.choose(sent))
+
+    def show(self) -> None:
+        """What was chosen, perhaps in another panel."""
+        if self._list is not None and self._list.value != self._place.chosen:
+            self._list.value = self._place.chosen  # type: ignore[misc]
 
 
 def progress(status: CommandStatus) -> float:

@@ -29,6 +29,7 @@ from explorer.viewer.study.order_panel import OrderPanel
 from explorer.viewer.study.plot_view import PlotView
 from explorer.viewer.study.process_view import (
     RETRY,
+    PlaceChoice,
     ProcessView,
     escaped,
     orders,
@@ -71,6 +72,7 @@ class StudyPanel(Panel):
         self._target = gui.add_markdown("")
         with gui.add_folder("Ranges and target of the next study", expand_by_default=False):
             self._order = OrderPanel(server, study.study_file, loaded, post)
+        self._place = PlaceChoice(server, page.place, "study", post)
         acts = orders(study, self._start, study.resume, self._queue) | {RETRY: study.retry}
         self._view = ProcessView(server, "Study", acts, post)
         with gui.add_folder("Other results", expand_by_default=False):
@@ -99,6 +101,7 @@ class StudyPanel(Panel):
         if self._target.content != target:
             self._target.content = target
         self._order.follow(photographed is not None)
+        self._place.show()
         waiting = self._study.waiting()
         known = "" if self._result is not None else "study"
         text = state_markdown(status, known, "runs", now.notice) + waiting_markdown(waiting)

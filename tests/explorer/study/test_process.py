@@ -10,7 +10,7 @@ import pytest
 
 from doe.studies.study import load_study
 from explorer.background import command_process
-from explorer.background.command_process import MOST_WAITING, BackgroundError, CommandStatus, advanced
+from explorer.background.command_process import HERE, MOST_WAITING, BackgroundError, CommandStatus, PourPlace, advanced
 from explorer.background.progress import ProgressEvent, StageProgress, failures, given_up, with_event
 from explorer.photograph.target import load_target, remove_target
 from explorer.priority import BACKGROUND
@@ -292,6 +292,21 @@ def test_a_changed_study_has_its_own_file_in_its_folder(tmp_path):
     wait_for(lambda: later.status().state == "finished")
     arguments = json.loads((folder / "arguments.json").read_text())
     assert arguments[arguments.index("--study") + 1] == str(file)
+
+
+def test_studies_pour_on_the_scheduler_of_the_server_until_another_place_is_chosen(tmp_path):
+    process, place = study(tmp_path), PourPlace("tcp://127.0.0.1:9")
+    process._place = place
+    process.start("quick")
+    wait_for(lambda: process.status().state == "finished")
+    asked = only_folder(tmp_path) / "arguments.json"
+    assert json.loads(asked.read_text())[-2:] == ["--scheduler", "tcp://127.0.0.1:9"]
+    with pytest.raises(BackgroundError, match=r"'tcp://evil:1' is not one of tcp://127.0.0.1:9, this machine$"):
+        place.choose("tcp://evil:1")
+    place.choose(HERE)
+    process.resume()
+    wait_for(lambda: process.status().state == "finished")
+    assert "--scheduler" not in json.loads(asked.read_text())
 
 
 def test_a_change_that_is_not_allowed_starts_nothing(tmp_path):

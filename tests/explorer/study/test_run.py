@@ -167,6 +167,7 @@ def test_a_target_out_of_reach_stops_a_study_unless_it_is_told_to_go_on(tmp_path
         (("--profile", "huge"), "sunflower_extract.toml: profile: 'huge' is not one of quick, standard, full\n"),
         (("--study", "nowhere.toml"), "sunflower_extract"),
         (("--fail-above", "-1"), "fail-above"),
+        (("--scheduler", "tcp://127.0.0.1:9", "--record", "pours"), "--record pours: a folder takes pours of this"),
     ],
 )
 def test_bad_orders_are_one_line_and_leave_nothing(tmp_path, options, says):
@@ -174,6 +175,14 @@ def test_bad_orders_are_one_line_and_leave_nothing(tmp_path, options, says):
     assert refused.exit_code == 2
     assert says in refused.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_where_no_scheduler_answers_the_folder_is_left_for_the_next_try(tmp_path, monkeypatch):
+    monkeypatch.setattr("solver.pours.dask_pool.CONNECTED", 0.2)
+    refused = calibrate(tmp_path, "--scheduler", "tcp://127.0.0.1:9")
+    assert refused.exit_code == 2
+    assert refused.stderr.startswith("error: --scheduler tcp://127.0.0.1:9: no Dask scheduler answers there")
+    assert list((tmp_path / "out").iterdir()) == []
 
 
 @pytest.mark.usefixtures("formula")

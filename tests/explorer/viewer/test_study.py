@@ -10,7 +10,7 @@ import pytest
 from doe.stages import planned_runs
 from doe.studies.study import load_study
 from doe.studies.study_result import study_from
-from explorer.background.command_process import CommandStatus
+from explorer.background.command_process import HERE, CommandStatus, PourPlace
 from explorer.background.progress import StageProgress, TriedRun
 from explorer.report.sections.answer import banner as study_banner
 from explorer.report.study_charts import Plot
@@ -34,7 +34,7 @@ from explorer.viewer.study.process_view import (
 from explorer.viewer.study.study_panel import NONE, StudyPanel
 from explorer.viewer.view import ThemeSwitch
 from solver.scenes.scene import value
-from tests.explorer.viewer.page_session import page_context
+from tests.explorer.viewer.page_session import event, page_context
 from tests.explorer.viewer.study_panel_at_hand import (
     OWN_PROFILES,
     STORELESS,
@@ -101,6 +101,26 @@ def test_the_profiles_of_the_study_file_are_offered_and_started(server, tmp_path
     chosen.value = "thesis-2"
     table.press("Queue")
     assert [one[:2] for one in table.study.asked] == [("start", "first look"), ("queue", "thesis-2")]
+
+
+def test_a_browser_chooses_between_the_scheduler_of_the_server_and_this_machine(server):
+    """And names none itself: what another scheduler sends would be run here."""
+    actions, place, at = Actions(), PourPlace("tcp://127.0.0.1:9"), "tcp://127.0.0.1:9"
+    context = page_context(server, FakeSession(), actions.post, study=FakeStudy(), diagnosis=STORELESS)
+    panel = StudyPanel(replace(context, place=place))
+    now = Now(FakeSession().status())
+    chosen = panel._place._list
+    assert (chosen.options, chosen.value) == ((at, HERE), at)
+    for sent in ("tcp://evil:1", ["a"], None):
+        chosen.value = sent
+        event(chosen, sent)
+        assert "is not one of tcp://127.0.0.1:9, this machine" in actions.carry_out()
+        panel.show(now)
+        assert chosen.value == place.chosen == at
+    event(chosen, HERE)
+    assert not actions.carry_out()
+    assert (place.chosen, place.arguments) == (HERE, ())
+    assert PanelAtHand(server).panel._place._list is None
 
 
 def test_an_empty_page_says_what_to_do(table):

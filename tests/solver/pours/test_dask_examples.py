@@ -25,7 +25,7 @@ def test_the_slurm_example_calibrates(tmp_path):
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     environment = os.environ | {"PATH": path, "REPOSE_STORE": str(tmp_path / "pours.sqlite")}
     done = subprocess.run(
-        [sys.executable, "slurm.py"], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=900
+        [sys.executable, "slurm.py"], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=3600
     )
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "results/slurm/result.json").is_file()

@@ -14,7 +14,7 @@ import pytest
 from solver import load_material, with_values
 from solver.pours import worker_pool
 from solver.pours.run import Job, run_pours
-from solver.pours.worker_pool import Rooms, WorkerLost, WorkerPool, deaf_to_interrupts
+from solver.pours.worker_pool import Room, Rooms, WorkerLost, WorkerPool, deaf_to_interrupts
 
 HEAP = with_values(
     load_material("sunflower_extract"), {"rig.mass": 0.003, "body.spheres": "coarse", "numerics.max_time": 0.4}
@@ -128,7 +128,7 @@ def test_a_scene_without_effects_in_the_kernels_has_a_room_without_them(taichi):
     rolling = with_values(HEAP, {"effect.rolling_resistance.rolling_friction": 0.1})
     tilted = with_values(HEAP, {"effect.plate_tilt.tilt_x": 2.0})
     rooms = Rooms()
-    rooms.make([rolling, HEAP])
+    rooms.make(Room.of([rolling, HEAP]))
     assert rooms.for_scene(rolling).capacity.effects
     assert not rooms.for_scene(HEAP).capacity.effects
     assert rooms.for_scene(tilted) is rooms.for_scene(HEAP)
@@ -136,11 +136,11 @@ def test_a_scene_without_effects_in_the_kernels_has_a_room_without_them(taichi):
 
 def test_a_room_is_kept_until_it_is_too_small(taichi):
     rooms = Rooms()
-    rooms.make([HEAP])
+    rooms.make(Room.of([HEAP]))
     first = rooms.for_scene(HEAP)
-    rooms.make([with_values(HEAP, {"rig.mass": 0.001})])
+    rooms.make(Room.of([with_values(HEAP, {"rig.mass": 0.001})]))
     assert rooms.for_scene(HEAP) is first
     larger = with_values(HEAP, {"rig.mass": 0.1})
-    rooms.make([larger])
+    rooms.make(Room.of([larger]))
     assert rooms.for_scene(larger).capacity.bodies > first.capacity.bodies
     assert rooms.for_scene(HEAP) is rooms.for_scene(larger)
