@@ -24,11 +24,14 @@ def repeat(
     """
     from explorer.population.run import PoursOrder, pour_more
     from explorer.scene.file import load_scene, with_settings
+    from explorer.study.duration import large_pour_text
     from explorer.tables.text_table import text_table
 
     # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished pours kept.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     scene = with_settings(load_scene(source, material), set_)
+    if large := large_pour_text(scene):
+        typer.echo(large, err=True)
     found = pour_more(PoursOrder(scene, pours, out, store, threads, scheduler), typer.echo)
     rows = [
         [one.observable, f"{one.sample.mean:.4g}", f"{one.sample.sd:.4g}", str(one.n), str(one.void)]

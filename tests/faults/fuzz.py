@@ -220,6 +220,8 @@ def fault_of(parser: Parser, seed: str) -> str | None:
 
 def line_fault(seed: str) -> str | None:
     """What is wrong with how the command line that ``seed`` makes ends; None for nothing."""
+    import taichi  # noqa: F401 - seconds that are the first command's and not those of its line
+
     with tempfile.TemporaryDirectory() as place:
         try:
             with _in_time():
