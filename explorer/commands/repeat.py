@@ -30,6 +30,7 @@ def repeat(
     from explorer.background.reporter import reporter_of
     from explorer.population.run import PoursOrder, pour_more
     from explorer.scene.file import load_scene, with_settings
+    from explorer.study.duration import large_pour_text
     from explorer.tables.text_table import text_table
     from solver import check_scheduler
 
@@ -38,6 +39,8 @@ def repeat(
     # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished pours kept.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     scene = with_settings(load_scene(source, material), set_)
+    if large := large_pour_text(scene):
+        typer.echo(large, err=True)
     with reporter_of("repeat", json) as reporter:
         found = pour_more(PoursOrder(scene, pours, out, store, threads, scheduler), reporter)
     rows = [

@@ -77,6 +77,7 @@ def simulate(
     from explorer.files.run_folder import appearing, json_text, write_run
     from explorer.files.run_result import result_of
     from explorer.scene.file import load_scene, with_settings
+    from explorer.study.duration import large_pour_text
     from explorer.tables.pours import RunTable, bench_data, bench_text, write_bench
     from solver import Job, check_scheduler, executor, run_pours
     from solver.arch import chosen
@@ -114,6 +115,8 @@ def simulate(
                 write_bench(folder, data)
         typer.echo(json_text(data) if json else bench_text(data))
         return
+    if large := large_pour_text(scene):
+        typer.echo(large, err=True)
     seeds = range(seed, seed + replicates)
     if replicates == 1:
         # A world is computed by one thread, and with one its kernels are those of the page and of workers.

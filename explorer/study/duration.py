@@ -14,7 +14,7 @@ from doe.stages import planned_runs
 from doe.store import RIG, Store, StoreError
 from doe.studies.profile import Profile
 from doe.studies.study import Study, with_profile
-from solver import body_counts, parameters, pour_rig, value
+from solver import Scene, body_counts, parameters, pour_rig, value
 from solver.scenes.time_step import time_step
 
 FEWEST = 3
@@ -26,6 +26,12 @@ SETTLING = 1.1
 """Simulated time [s] from the last body's entry to rest; mean of the same pours."""
 WORKER_GB = 0.25
 """Resident memory of a process that pours, with a study's few hundred bodies [GB]: 0.22 to 0.23 of the shipped ones."""
+
+
+SPHERE_GB = 3.3e-6
+"""Further memory for each member sphere [GB]: a funnel of 162 358 spheres takes 0.79 GB, one of 160 takes 0.25."""
+LONG = 600.0
+"""Time of a pour [s] above which the command line tells it beforehand."""
 
 
 def duration_text(study: Study, profile: Profile, store: Path, workers: int | None = None) -> str:
@@ -85,17 +91,38 @@ def reckoned_time(study: Study, profile: Profile, experiment: str = "") -> float
         sized = with_profile(study, profile.name)[0]
     except ValueError:  # a profile that this study cannot have, which is told where it is started
         return math.nan
-    scene = sized.scene_of(experiment)
+    return pour_time(sized.scene_of(experiment))
+
+
+def pour_time(scene: Scene) -> float:
+    """Time of one pour of ``scene`` [s], reckoned as in :func:`reckoned_time`."""
     if "insertion.rate" not in parameters(scene):
         return math.nan
     counts = body_counts(scene)
-    spheres = sum(n * len(body.clump.radii) for n, body in zip(counts, scene.bodies, strict=True))
     if "rig.mass" in parameters(scene):
         mass = float(value(scene, "rig.mass"))
     else:
         mass = sum(n * body.mass for n, body in zip(counts, scene.bodies, strict=True))
     simulated = mass / float(value(scene, "insertion.rate")) + SETTLING + (pour_rig(scene).running_time or 0.0)
-    return spheres * simulated / time_step(scene) / PACE
+    return spheres_of(scene) * simulated / time_step(scene) / PACE
+
+
+def spheres_of(scene: Scene) -> int:
+    """Member spheres of all bodies that are poured."""
+    return sum(n * len(body.clump.radii) for n, body in zip(body_counts(scene), scene.bodies, strict=True))
+
+
+def large_pour_text(scene: Scene) -> str:
+    """What one pour of ``scene`` takes, where that is more than ``LONG``; otherwise "". Reckoned before it begins."""
+    seconds = pour_time(scene)
+    if not seconds > LONG:
+        return ""
+    time = f"{seconds / 3600.0:.1f} h" if seconds >= 5400.0 else f"{seconds / 60.0:.0f} min"
+    spheres = spheres_of(scene)
+    return (
+        f"{sum(body_counts(scene))} bodies of {spheres} spheres: roughly {time} a pour on one core (from spheres and "
+        f"steps, to a factor of two), {WORKER_GB + spheres * SPHERE_GB:.1f} GB of memory"
+    )
 
 
 def stored_times(study: Study, profile: Profile, store: Path, experiment: str = "") -> list[float]:

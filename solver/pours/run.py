@@ -13,11 +13,14 @@ from solver import backend
 from solver.engine.state import Capacity
 from solver.engine.tables import wall_tables
 from solver.engine.world import Batch, compiled_in, wall_materials
+from solver.params import ParameterError
 from solver.pours.checkpoint import Checkpoint, resumed
 from solver.pours.pour import Pour
 from solver.pours.record import Record
-from solver.scenes.scene import Scene, actual, body_counts
+from solver.scenes.scene import Scene, actual, body_counts, poured_mass
 
+MOST_BODIES = 1_000_000
+"""In one pour; more are a slip of a unit."""
 CONTACTS_PER_MEMBER = 16
 """Room in the contact list: entries per member sphere. A bed of long bodies holds 2–4."""
 
@@ -49,11 +52,19 @@ def capacity_for(scenes: Sequence[Scene], worlds: int) -> Capacity:
 
 
 def sizes_for(scenes: Sequence[Scene], worlds: int) -> Capacity:
-    """Sizes that hold any of ``scenes``, rounded up so that a small change of the mixture fits as well."""
+    """Sizes that hold any of ``scenes``, rounded up so that a small change of the mixture fits as well.
+
+    Raises ParameterError for more than ``MOST_BODIES``.
+    """
     scenes = [actual(scene) for scene in scenes]
     bodies = members = kinds = 0
     for scene in scenes:
         numbers = body_counts(scene)
+        if sum(numbers) > MOST_BODIES:
+            raise ParameterError(
+                f"rig: {poured_mass(scene):g} kg are {sum(numbers)} bodies; a pour holds at most {MOST_BODIES}: pour "
+                "less, or larger ones"
+            )
         bodies = max(bodies, sum(numbers))
         members = max(members, sum(n * len(b.clump.radii) for n, b in zip(numbers, scene.bodies, strict=True)))
         kinds = max(kinds, len(scene.bodies) + len(wall_materials(scene)))

@@ -49,7 +49,10 @@ _place = tempfile.TemporaryDirectory()
 _open = ExitStack()
 atexit.register(_open.close)
 PATIENCE = 20
-"""[s] in which a file of the size of a shipped one has to be read or refused."""
+"""[s] of computing in which a file of the size of a shipped one has to be read or refused."""
+WAITING = 10 * PATIENCE
+"""[s] by the clock, for what computes nothing but waits; a busy machine is slower than ``PATIENCE``."""
+TIMERS = ((signal.SIGPROF, signal.ITIMER_PROF, PATIENCE), (signal.SIGALRM, signal.ITIMER_REAL, WAITING))
 MEMORY = 2**31
 """[bytes] that reading may take beside what the program has taken before."""
 TOKENS = (
@@ -188,12 +191,14 @@ def _in_time() -> Iterator[None]:
     def over(*_: object) -> None:
         raise TimeoutError(f"not read or refused within {PATIENCE} s")
 
-    signal.signal(signal.SIGALRM, over)
-    signal.alarm(PATIENCE)
+    for alarm, timer, seconds in TIMERS:
+        signal.signal(alarm, over)
+        signal.setitimer(timer, seconds)
     try:
         yield
     finally:
-        signal.alarm(0)
+        for _, timer, _ in TIMERS:
+            signal.setitimer(timer, 0.0)
 
 
 def fault_of(parser: Parser, seed: str) -> str | None:
@@ -220,6 +225,8 @@ def fault_of(parser: Parser, seed: str) -> str | None:
 
 def line_fault(seed: str) -> str | None:
     """What is wrong with how the command line that ``seed`` makes ends; None for nothing."""
+    import taichi  # noqa: F401 - seconds that are the first command's and not those of its line
+
     with tempfile.TemporaryDirectory() as place:
         try:
             with _in_time():

@@ -93,10 +93,10 @@ class ReplayPage:
             self._text = server.gui.add_html("")
             self._plots = [_plot(server, recording, *curve) for curve in CURVES if curve[0] in recording.curves]
             with server.gui.add_folder("Parameters", expand_by_default=False):
-                server.gui.add_markdown(recording.parameters)
+                server.gui.add_markdown(inert(recording.parameters))
             if recording.outcome:
                 with server.gui.add_folder("Outcome", expand_by_default=False):
-                    server.gui.add_markdown(recording.outcome)
+                    server.gui.add_markdown(inert(recording.outcome))
         with tabs.add_tab("Look", viser.Icon.EYE):
             self._look = ReplayLook(server, recording, colour_bar, self._actions.post)
         self._seen = False
@@ -353,3 +353,8 @@ def drawn_height(recording: Recording) -> float:
     tops = [float(s.shape.vertices[:, 2].max()) for s in recording.surfaces]
     tops += [float(f.position[:, 2].max()) for c in recording.components for f in c.frames if len(f.scale)]
     return max(float(np.max(tops)), 1e-3)
+
+
+def inert(document: str) -> str:
+    """Markdown of a recording, which may be a stranger's: tables stay, HTML is shown as text, no picture is fetched."""
+    return document.replace("<", "&lt;").replace("![", "!\\[")

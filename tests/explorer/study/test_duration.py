@@ -7,9 +7,11 @@ import pytest
 from doe.stages import planned_runs
 from doe.store import Store, StoredRun
 from doe.studies.study import load_study, with_profile
-from explorer.study.duration import PACE, SETTLING, duration_text
-from solver import PHYSICS, body_counts, value, with_rig
+from explorer.study.duration import PACE, SETTLING, SPHERE_GB, WORKER_GB, duration_text, large_pour_text
+from solver import PHYSICS, ParameterError, body_counts, value, with_rig, with_values
+from solver.pours.run import MOST_BODIES, sizes_for
 from solver.scenes.time_step import time_step
+from solver.shapes.solid import Solid
 
 STUDY = load_study("sunflower_extract")
 QUICK, STANDARD = STUDY.profiles["quick"], STUDY.profiles["standard"]
@@ -92,3 +94,22 @@ def test_a_study_whose_pilot_sizes_it_takes_at_least_that(store):
 def test_a_profile_that_the_study_cannot_have_tells_no_time(tmp_path):
     said = duration_text(STUDY, replace(STANDARD, name="nobody's"), tmp_path / "none.sqlite", 2)
     assert "how long is told after the first pours" in said
+
+
+def test_a_large_pour_is_told_beforehand_and_a_small_one_is_not():
+    assert large_pour_text(STUDY.scene) == ""
+    large = with_values(STUDY.scene, {"rig.mass": 5.0})
+    spheres = sum(n * len(body.clump.radii) for n, body in zip(body_counts(large), large.bodies, strict=True))
+    seconds = spheres * (5.0 / value(large, "insertion.rate") + SETTLING) / time_step(large) / PACE
+    told = large_pour_text(large)
+    assert told.startswith(
+        f"{sum(body_counts(large))} bodies of {spheres} spheres: roughly {seconds / 3600:.1f} h a pour"
+    )
+    assert told.endswith(f"{WORKER_GB + spheres * SPHERE_GB:.1f} GB of memory")
+
+
+def test_a_pour_of_too_many_bodies_is_refused_before_room_is_made_for_it():
+    grain = replace(STUDY.scene.bodies[0], shape=Solid("sphere", (2e-4,)), mass_fraction=1.0)
+    scene = with_values(replace(STUDY.scene, bodies=(grain,)), {"rig.mass": 5.0})
+    with pytest.raises(ParameterError, match=rf"5 kg are \d+ bodies; a pour holds at most {MOST_BODIES}"):
+        sizes_for([scene], 1)

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import viser
 
 from explorer.live.frames import Frame
 from explorer.logs.pour_log import PourLog
@@ -315,3 +316,18 @@ def test_it_plays_from_the_beginning_when_the_first_browser_comes(page):
         callback(None)
     page._actions.carry_out()
     assert page._timeline.time == 0.04
+
+
+def test_a_recording_of_a_stranger_puts_nothing_but_text_on_the_page(recording):
+    hostile = "| a | b |\n|---|---|\n| <img src=x onerror=alert(1)> | ![](http://example.org/seen.png) |"
+    server = guarded_server("127.0.0.1", 0, "test")
+    try:
+        ReplayPage(server, replace(recording, parameters=hostile, outcome=hostile), "<b>pour</b>.rrd")
+        children = [
+            one for place in server.gui._container_handle_from_uuid.values() for one in place._children.values()
+        ]
+        texts = [one.content for one in children if isinstance(one, viser.GuiMarkdownHandle | viser.GuiHtmlHandle)]
+        assert sum("| a | b |" in text for text in texts) == 2
+        assert not any("<img" in text or "![](" in text for text in texts)
+    finally:
+        server.stop()
