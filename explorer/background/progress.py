@@ -90,7 +90,7 @@ class ProgressEvent(Record):
     time: float = 0.0
     """Seconds since the start."""
     stage: str
-    """The stage that runs; empty before the first."""
+    """The stage that runs; before the first pour "compiling the solver"."""
     done: int
     """Pours that have ended, of the whole command where ``stages`` is there, else of the stage; of validate-diagnosis
     data sets that are judged."""

@@ -1,6 +1,7 @@
 """Settings become pours: seeds, replacement of failed runs, and reuse from the store."""
 
 import dataclasses
+import weakref
 from contextlib import closing
 
 import numpy as np
@@ -86,6 +87,16 @@ def made_up(queue, room):
     """In place of pours: an empty pile of each job."""
     while queue:
         yield queue.popleft(), record_of(empty_pile(), np.zeros(1), np.zeros(1), poured_mass=1.0)
+
+
+def test_runs_that_are_yielded_are_not_kept(tmp_path):
+    scene = with_values(load_material("sunflower_extract"), TINY)
+    runner = PourRunner(scene, Store(tmp_path / "runs.sqlite"), "test", 1, pours=made_up, seeds=range(1, 6))
+    before: list[weakref.ref[Run]] = []
+    for _, run in runner.each("stage", [Setting("a", {}, 5)]):
+        assert all(one() is None for one in before)
+        before.append(weakref.ref(run))
+    assert len(before) == 5
 
 
 def test_every_experiment_is_poured_under_seeds_keys_and_labels_of_its_own(tmp_path):

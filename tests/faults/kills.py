@@ -90,12 +90,18 @@ def at_work(folder: Path) -> dict[str, list[int]]:
             line = place.read_bytes()
             if str(folder / "out").encode() in line and b"python" in line.split(b"\0")[0]:
                 found["page" if b"page_host" in line else "command"].append(int(place.parent.name))
-    for command in found["command"]:
-        with contextlib.suppress(OSError):
-            for child in Path(f"/proc/{command}/task/{command}/children").read_text().split():
-                # multiprocessing's resource tracker is a child, but none that pours.
-                if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes():
-                    found["worker"].append(int(child))
+    found["worker"] = [worker for command in found["command"] for worker in workers(command)]
+    return found
+
+
+def workers(command: int) -> list[int]:
+    """The processes that pour for the process ``command``."""
+    found = list[int]()
+    with contextlib.suppress(OSError):
+        for child in Path(f"/proc/{command}/task/{command}/children").read_text().split():
+            # multiprocessing's resource tracker is a child, but none that pours.
+            if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes():
+                found.append(int(child))
     return found
 
 

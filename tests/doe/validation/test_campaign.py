@@ -55,9 +55,29 @@ def order(tmp_path_factory):
     )
 
 
+class Listener:
+    """Keeps what it is told."""
+
+    def __init__(self):
+        self.pours, self.sets = [], []
+
+    def pour(self, part, left, ended):
+        self.pours.append((part, left))
+
+    def judged(self, done, planned, judged_now, line):
+        self.sets.append((done, planned, judged_now))
+
+    def watched(self, pours):
+        return pours
+
+
 @pytest.fixture(scope="module")
 def rows(order):
-    return run_campaign(order, print)
+    listener = Listener()
+    found = run_campaign(order, print, listener)
+    assert listener.sets == [(1, 3, 1), (2, 3, 2), (3, 3, 3)]
+    assert {"laboratory"} < {part for part, _ in listener.pours}
+    return found
 
 
 def numbers(rows):

@@ -24,7 +24,24 @@ from solver import AssetNotFoundError
 from tests.doe.validation.small_model import small_laboratory
 
 
-@pytest.mark.slow
+class Listener:
+    """Keeps what it is told of pours."""
+
+    def __init__(self):
+        self.told, self.seen = [], 0
+
+    def pour(self, part, left, ended):
+        self.told.append((part, left, ended.outcome, ended.wall_s > 0.0))
+
+    def watched(self, pours):
+        def run(queue, room):
+            for one in pours(queue, room):
+                self.seen += 1
+                yield one
+
+        return run
+
+
 @pytest.mark.slow
 def test_laboratories_pour_with_and_without_an_effect_and_nothing_twice(tmp_path):
     laboratory = read_laboratory(small_laboratory(tmp_path / "laboratory"))
@@ -33,7 +50,8 @@ def test_laboratories_pour_with_and_without_an_effect_and_nothing_twice(tmp_path
     theta = tuple(0.5 * (parameter.low + parameter.high) for parameter in measurement.parameters)
     rolling = (("rolling_resistance", (0.3,)),)
     null, effect = Truth(Case(9, 0, "null"), theta), Truth(Case(9, 1, "effect"), theta, rolling)
-    with closing(Store(tmp_path / "runs.sqlite")) as store, WorkPlace(store, 2) as place:
+    listener = Listener()
+    with closing(Store(tmp_path / "runs.sqlite")) as store, WorkPlace(store, 2, listener=listener) as place:
         answers = Answers(laboratory, None, place, Budget())  # nothing is judged
         assert answers.measured(Truth(Case(9, 2, "effect"), theta, missing="bounds"), [condition]) is None
         plain, acting = (answers.measured(truth, [condition]) for truth in (null, effect))
@@ -45,7 +63,8 @@ def test_laboratories_pour_with_and_without_an_effect_and_nothing_twice(tmp_path
         assert [one.reading for one in plain[condition.name]] != [one.reading for one in acting[condition.name]]
         again = answers.measured(null, [condition])
         assert [one.reading for one in again[condition.name]] == [one.reading for one in plain[condition.name]]
-        assert place.poured == poured
+        assert place.poured == poured == len(listener.told) == listener.seen
+        assert listener.told[-1] == ("laboratory", 0, "measured", True)
     for scanner, offer in ((None, SCALARS), (Scanner.drawn(np.random.default_rng(0)), SCAN)):
         folder = tmp_path / offer
         folder.mkdir()

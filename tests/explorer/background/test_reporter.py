@@ -2,6 +2,7 @@
 
 import io
 import logging
+import math
 from collections import deque
 from contextlib import suppress
 from dataclasses import replace
@@ -125,7 +126,7 @@ def test_so_is_that_of_one_that_broke_off(tmp_path):
 
 def test_a_lost_worker_is_said_and_logged_and_pours_are_told_once(tmp_path):
     said = []
-    with Reporter("repeat", said.append) as reporter:
+    with Reporter("repeat", said.append, every=math.inf) as reporter:
         reporter.begin(tmp_path)
         logging.getLogger("solver.pours.worker_pool").warning("a worker process has ended (%d of 3 losses)", 1)
         PourProgress(reporter).pour("pours", 0, Ended("a", 1, Outcome.JAMMED, ""))

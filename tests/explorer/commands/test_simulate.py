@@ -125,8 +125,7 @@ def test_a_pour_that_diverges_leaves_the_scene_that_does_so_again(tmp_path):
     _, pour, end = checked_events(result.stdout)
     assert (pour["run"]["outcome"], pour["scene"]) == ("overlap_limit", str(tmp_path / "run" / "diverged_3.toml"))
     assert (end["outcome"], end["result"]) == ("finished", str(tmp_path / "run" / "result.json"))
-    (line,) = result.stderr.splitlines()
-    assert line.endswith(f"again: explorer simulate {pour['scene']} --seed 3")
+    assert f"again: explorer simulate {pour['scene']} --seed 3\n" in result.stderr
     assert explorer("simulate", pour["scene"], "--seed", 3, "--out", tmp_path / "again").exit_code == 0
     first, again = (json.loads((tmp_path / name / "result.json").read_text()) for name in ("run", "again"))
     for key in ("outcome", "message", "steps", "parameters"):

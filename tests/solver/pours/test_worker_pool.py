@@ -14,7 +14,7 @@ import pytest
 from solver import load_material, with_values
 from solver.pours import worker_pool
 from solver.pours.run import Job, run_pours
-from solver.pours.worker_pool import Room, Rooms, WorkerLost, WorkerPool, deaf_to_interrupts
+from solver.pours.worker_pool import PourBrokeOff, Room, Rooms, WorkerLost, WorkerPool, deaf_to_interrupts
 
 HEAP = with_values(
     load_material("sunflower_extract"), {"rig.mass": 0.003, "body.spheres": "coarse", "numerics.max_time": 0.4}
@@ -49,8 +49,10 @@ def test_jobs_may_be_added_while_it_runs(pool):
 
 def test_a_workers_error_arrives_with_its_text(pool):
     queue = deque([Job(with_values(HEAP, {"rig.mass": 0.2}), 1)])
-    with pytest.raises(RuntimeError, match="a pour broke off"):
+    job = queue[0]
+    with pytest.raises(PourBrokeOff, match=r"a pour broke off: .*; seed 1 of") as broken:
         list(pool.run_queue(queue, [HEAP]))
+    assert broken.value.job is job
 
 
 def kill(process):
