@@ -88,7 +88,7 @@ def serve(
         ending.callback(diagnosis.close)
         session = ending.enter_context(closing(Session()))
         session.start(scene, seed, project.source)
-        page = Page(server, session, project, study, diagnosis, channel, pages, recorders, place)
+        page = Page(server, session, project, study, diagnosis, channel, pages, recorders, place=place)
         ending.enter_context(closing(page))
         ready(f"http://{address(host)}:{server.get_port()}")
         page.run(stop)

@@ -120,7 +120,7 @@ def test_a_recording_of_the_page_holds_the_changes(running, tmp_path):
 class RestartedPage:
     """Stands in for the page: it hands its recorder two pours, and ends."""
 
-    def __init__(self, *others):
+    def __init__(self, *others, place):
         (self._recorder,) = others[-1]
 
     def run(self, stop):

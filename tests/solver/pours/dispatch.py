@@ -139,6 +139,8 @@ def overhead(dask: Dask, rounds: int, pours: int) -> None:
         own = [psutil.Process(child.pid) for child in multiprocessing.active_children()]
         sides = [(local, [here, *own]), (many, [here, *family(dask.scheduler), *family(dask.workers)])]
         idle = spent(partial(time.sleep, IDLE), sides[1][1])
+        rate = idle.cpu_s / idle.wall_s
+        print(f"Dask at rest: {100 * rate:.1f} % of a core", flush=True)
         found: list[list[Spent]] = []
         for k in range(rounds):
             jobs = [Job(SCENE, 1000 + k * pours + j) for j in range(pours)]
@@ -151,9 +153,8 @@ def overhead(dask: Dask, rounds: int, pours: int) -> None:
             print(f"round {k + 1}: {'; '.join(told)}", flush=True)
     print(f"{rounds} rounds of {pours} pours, {WORKERS} workers of Dask over {WORKERS} processes of local:")
     print(f"  wall time {ratio_text([many.wall_s / local.wall_s for local, many in found])}")
-    rate = idle.cpu_s / idle.wall_s
     busy = [(many.cpu_s - rate * many.wall_s) / local.cpu_s for local, many in found]
-    print(f"  CPU time {ratio_text(busy)} without the {100 * rate:.1f} % of a core that Dask takes at rest")
+    print(f"  CPU time {ratio_text(busy)} without what Dask takes at rest")
 
 
 def tasks(dask: Dask, number: int) -> Record:
