@@ -145,7 +145,9 @@ class Store:
         try:
             yield
         except (sqlite3.Error, OSError) as error:
-            raise StoreError(f"{self.path}: cannot be used as a store of runs ({error})") from None
+            raise StoreError(
+                f"{self.path}: cannot be used as a store of runs ({error}); --store FILE names another"
+            ) from None
 
     def _opened(self) -> str:
         """Name of the table that holds the runs; made where there is none."""

@@ -11,11 +11,14 @@ import contextlib
 import io
 import os
 import select
+import shutil
 import signal
+import tempfile
 import threading
 import time
 import warnings
 from collections.abc import Callable
+from multiprocessing.util import Finalize
 from pathlib import Path
 
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
@@ -58,6 +61,7 @@ def init(threads: int | None = None) -> None:
     arch = getattr(ti, chosen())
     options = {} if threads is None else {"cpu_max_num_threads": threads}
     ti.set_logging_level(ti.ERROR)
+    _see_to_a_kernel_folder()
     _drop_stale_lock()
     # ti.init prints a banner that no option silences; it would stand in front of JSON on standard output.
     with contextlib.redirect_stdout(io.StringIO()):
@@ -161,6 +165,29 @@ def _done_by_a_copy(work: Callable[[], object]) -> bool:
             os.kill(copy, signal.SIGKILL)
         _, status = os.waitpid(copy, 0)
     return ended and status == 0
+
+
+def _see_to_a_kernel_folder() -> None:
+    """Give Taichi a folder for the time of this process where it could not write into its own.
+
+    It writes there when it ends, even with ``offline_cache`` off, and a folder that takes nothing is a segmentation
+    fault then, after all work is done.
+    """
+    folder = kernel_folder()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return
+    except OSError:
+        own = tempfile.mkdtemp(prefix="explorer-kernels-")
+    os.environ["TI_OFFLINE_CACHE_FILE_PATH"] = own
+    # Also in a process of a pool, where `atexit` does nothing.
+    Finalize(None, _give_up_kernel_folder, (own,), exitpriority=0)
+
+
+def _give_up_kernel_folder(folder: str) -> None:
+    ti.reset()
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def _drop_stale_lock() -> None:

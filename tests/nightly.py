@@ -51,6 +51,7 @@ PARTS = {
             "tests/test_plugins.py",
         )
     ),
+    "installed from a wheel": Part((*SLOW, "tests/test_installed.py")),
     "page speed": Part((sys.executable, "-m", "tests.browser.page_speed")),
     "documents": Part((*SLOW, "tests/test_readme.py", "-k", "as_they_are_written")),
     "README, whole": Part((*SLOW, "tests/test_readme.py", "-k", "to_their_ends")),

@@ -13,8 +13,6 @@ from dask_kubernetes.operator import KubeCluster
 
 IMAGE = "registry.example.org/repose-explorer:0.1.0"
 WORKERS = 100
-# The shipped study, small; the coarse shapes of its quick profile alone do not come near the target.
-STUDY = ["--study", "sunflower_extract", "--profile", "quick", "--beyond-reach"]
 COMMAND = ["dask", "worker", "--nthreads", "1"]
 
 if __name__ == "__main__":
@@ -22,5 +20,5 @@ if __name__ == "__main__":
     with KubeCluster(
         name="repose", image=IMAGE, n_workers=WORKERS, resources=one_core, worker_command=COMMAND
     ) as cluster:
-        command = ["explorer", "calibrate", "--headless", *STUDY, "--out", "results/kubernetes"]
+        command = ["explorer", "calibrate", "--headless", "--profile", "quick", "--out", "results/kubernetes"]
         subprocess.run([*command, "--scheduler", cluster.scheduler_address], check=True)

@@ -8,8 +8,6 @@ import subprocess
 from dask_jobqueue import SLURMCluster
 
 WORKERS = 100
-# The shipped study, small; the coarse shapes of its quick profile alone do not come near the target.
-STUDY = ["--study", "sunflower_extract", "--profile", "quick", "--beyond-reach"]
 
 if __name__ == "__main__":
     # A job is one worker: one pour at a time, in one thread. The first pour of a kind compiles for some seconds.
@@ -17,5 +15,5 @@ if __name__ == "__main__":
         queue="standard", account="my-project", walltime="02:00:00", cores=1, processes=1, memory="2GB"
     ) as cluster:
         cluster.scale(WORKERS)
-        command = ["explorer", "calibrate", "--headless", *STUDY, "--out", "results/slurm"]
+        command = ["explorer", "calibrate", "--headless", "--profile", "quick", "--out", "results/slurm"]
         subprocess.run([*command, "--scheduler", cluster.scheduler_address], check=True)
