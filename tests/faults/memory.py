@@ -57,7 +57,8 @@ class Growth:
         settled = pours > WARM_UP * pours[-1]
         x, y = (np.array([part.mean() for part in np.array_split(one[settled], BLOCKS)]) for one in (pours, memory))
         line = stats.linregress(x, y)
-        half_width = float(stats.t.ppf(0.975, len(x) - 2) * line.stderr)
+        # Without any change there is no scatter to tell an error from.
+        half_width = float(np.nan_to_num(stats.t.ppf(0.975, len(x) - 2) * line.stderr))
         ends = line.intercept + line.slope * pours[settled][[0, -1]]
         return Growth(float(line.slope), half_width, *map(float, ends))
 

