@@ -60,14 +60,15 @@ preview: .venv/.ready ## record the pour that the page shows while its solver lo
 page-speed: .venv/.ready ## frames/s and slider echo of the page: one and two browsers, beside a study, over a slow line (6 min)
 	$(BIN)/python -m tests.browser.page_speed
 
-faults: .venv/.ready ## a study killed 20 times and a diagnosis 10 times, against unbroken ones (an hour)
+faults: .venv/.ready ## a study killed 20 times, a diagnosis and a page 10 times each, against unbroken ones (an hour)
 	$(BIN)/python -m tests.faults.kills study --kills 20
 	$(BIN)/python -m tests.faults.kills diagnosis --kills 10
+	$(BIN)/python -m tests.faults.kills page --kills 10
 
 memory: .venv/.ready ## memory of a command and its worker over 10,000 pours of 0.06 CPU s (30 min)
 	$(BIN)/python -m tests.faults.memory --pours 10000
 
-fuzz: .venv/.ready ## 500 damaged or hostile files for each parser (15 min)
+fuzz: .venv/.ready ## 500 damaged or hostile files for each parser (an hour)
 	$(BIN)/python -m tests.faults.fuzz --inputs 500
 
 foreign: .venv/.ready ## data sets poured by LIGGGHTS with effects that no file states, judged (an hour)

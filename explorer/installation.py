@@ -128,7 +128,7 @@ def examined_text(findings: Sequence[Finding]) -> str:
     verdict = (
         f"not ready: {', '.join(needed)}" if needed else "ready: pouring, calibrating, diagnosing and the page work"
     )
-    return f"{table}\n\n{verdict}; missing that not everybody needs: {others}"
+    return f"{table}\n\n{verdict}; optional items missing: {others}"
 
 
 def tell_of_solver() -> None:
@@ -279,8 +279,9 @@ def _folders(solver: SolverTrial) -> Iterator[Finding]:
 
 def _folder(thing: str, folder: Path, limits: str, remedy: str, needed: bool = True) -> Finding:
     """Whether ``folder``, or the first above it that there is, takes a file. It is not made."""
-    there = next(one for one in (folder, *folder.absolute().parents) if one.exists())
+    there = folder
     try:
+        there = next(one for one in (folder, *folder.absolute().parents) if one.exists())
         with tempfile.TemporaryFile(dir=there) as file:
             file.write(bytes(4096))
             file.flush()

@@ -112,7 +112,7 @@ _LATE = {
 }
 
 
-def _need_a_home() -> None:
+def _ensure_home() -> None:
     """Set ``HOME`` where it is not: Taichi aborts without, and what is kept for a user would land in a folder ``~``.
 
     An account without an entry, as in a container, has no home: it gets one that there is not, so that what is kept
@@ -129,7 +129,7 @@ def _need_a_home() -> None:
         os.environ["HOME"] = NO_HOME
 
 
-_need_a_home()
+_ensure_home()
 
 
 def __getattr__(name: str) -> Any:

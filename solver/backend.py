@@ -61,7 +61,7 @@ def init(threads: int | None = None) -> None:
     arch = getattr(ti, chosen())
     options = {} if threads is None else {"cpu_max_num_threads": threads}
     ti.set_logging_level(ti.ERROR)
-    _see_to_a_kernel_folder()
+    _ensure_kernel_folder()
     _drop_stale_lock()
     # ti.init prints a banner that no option silences; it would stand in front of JSON on standard output.
     with contextlib.redirect_stdout(io.StringIO()):
@@ -167,7 +167,7 @@ def _done_by_a_copy(work: Callable[[], object]) -> bool:
     return ended and status == 0
 
 
-def _see_to_a_kernel_folder() -> None:
+def _ensure_kernel_folder() -> None:
     """Give Taichi a folder for the time of this process where it could not write into its own.
 
     It writes there when it ends, even with ``offline_cache`` off, and a folder that takes nothing is a segmentation

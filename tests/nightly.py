@@ -54,13 +54,16 @@ PARTS = {
     "installed from a wheel": Part((*SLOW, "tests/test_installed.py")),
     "page speed": Part((sys.executable, "-m", "tests.browser.page_speed")),
     "documents": Part((*SLOW, "tests/test_readme.py", "-k", "as_they_are_written")),
-    "README, whole": Part((*SLOW, "tests/test_readme.py", "-k", "to_their_ends")),
+    "README, whole": Part((*SLOW, "tests/test_readme.py", "-k", "to_their_ends"), nightly=False),
     "a study killed 20 times": Part((sys.executable, "-m", "tests.faults.kills", "study", "--kills", "20")),
     "fuzzing": Part((sys.executable, "-m", "tests.faults.fuzz", "--inputs", "100")),
     "a diagnosis killed 10 times": Part(
         (sys.executable, "-m", "tests.faults.kills", "diagnosis", "--kills", "10"), nightly=False
     ),
-    "memory over 10,000 pours": Part((sys.executable, "-m", "tests.faults.memory", "--pours", "10000"), nightly=False),
+    "a page killed 10 times": Part(
+        (sys.executable, "-m", "tests.faults.kills", "page", "--kills", "10"), nightly=False
+    ),
+    "memory over 10,000 pours": Part((sys.executable, "-m", "tests.faults.memory", "--pours", "10000")),
     "trefoils": Part((*SLOW, "tests/explorer/diagnosis/test_trefoils.py"), nightly=False),
     "other engines, 18 pours each": Part((*SLOW, "-s", "tests/peers/test_same_pile.py"), nightly=False),
     "benchmark": Part(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -81,7 +82,8 @@ def outside_files(folder: Path, table: Mapping[str, Any]) -> Iterator[tuple[str,
     root = folder.resolve()
     # One after the other: what is outside need not be opened to be told.
     for key, file in _named_files(folder, table):
-        if "\0" not in str(file) and not (found := file.resolve()).is_relative_to(root):
+        # Not by Path.resolve, which raises for links that lead round in a circle.
+        if "\0" not in str(file) and not (found := Path(os.path.realpath(file))).is_relative_to(root):
             yield key, found
 
 
@@ -98,16 +100,28 @@ def _named_files(folder: Path, table: Mapping[str, Any]) -> Iterator[tuple[str, 
         )
         named = [("condition.data", entry.get("data")), *(("condition.images", picture) for picture in pictures)]
         yield from ((key, folder / name) for key, name in named if isinstance(name, str))
+        rig = entry.get("rig_parameters")
+        if isinstance(rig, dict) and isinstance(mesh := rig.get("mesh"), str):
+            yield "condition.rig_parameters.mesh", folder / own_path(mesh)
     for kind in ("piles", "scans"):
         yield from ((f"{kind}/{file.name}", file) for file in sorted((folder / kind).glob("*")))
 
 
 def _of_material(folder: Path, name: object) -> Iterator[Path]:
-    """The file of a material that is not a shipped one, and the files that it names."""
+    """The file of a material that is not a shipped one, and the files that it names: meshes, and bodies with theirs."""
     path = folder / own_path(name) if isinstance(name, str) and "\0" not in name else None
     if path is not None and path.is_file():
         yield path
-        yield from (path.parent / file for file in files_named_in(read_toml(path)) if isinstance(file, str))
+        for file in files_named_in(read_toml(path)):
+            if isinstance(file, str):
+                yield from _of_body(path.parent / own_path(file))
+
+
+def _of_body(path: Path) -> Iterator[Path]:
+    """A file that a material names and, of a body's, the mesh that it names."""
+    yield path
+    if path.suffix == ".toml" and path.is_file():
+        yield from (path.parent / own_path(file) for file in files_named_in(read_toml(path)) if isinstance(file, str))
 
 
 def _read(folder: Path, table: Settings, outside: Sequence[str]) -> Measurement:

@@ -1,12 +1,7 @@
 """A command of the command line in a process of its own, and the orders that wait for it.
 
 It has lower priority, so that the live pour stays smooth. The command writes ``progress.jsonl`` into its output folder,
-one object per event, which is all that is read here:
-
-    {"time": seconds, "stage": text, "done": runs, "planned": runs, "eta_s": seconds or null, "line": text or null}
-
-and, where the command tells it, "stages": {name: [done, planned]} and "run", one run that ended
-(`explorer.background.progress`).
+one `explorer.background.progress.ProgressEvent` per line, which is all that is read here.
 
 The next order begins when the one before has come to its end: a report or a failure. A command that was cancelled
 leaves the line waiting for the next start, because who cancels wants quiet.
@@ -214,8 +209,6 @@ class CommandProcess:
     def _take_progress(self) -> None:
         if self.out is None or not (file := self.out / PROGRESS).is_file():
             return
-        if file.stat().st_size < self._read:  # a resumed command begins the file anew
-            self._read = 0
         with file.open("rb") as stream:
             stream.seek(self._read)
             for line in _whole_lines(stream):

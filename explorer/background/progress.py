@@ -127,15 +127,22 @@ class Bar:
         one_screen = sys.stdout.isatty()
         shown = console.is_terminal or console.is_jupyter
         columns = TextColumn("{task.description}"), BarColumn()
+        # Drawn when there is something new, without a thread of its own: Taichi's kernels are kept at once only where
+        # there is one thread (`solver.backend.keep_compiled`).
         self._progress = Progress(
-            *columns, console=console, transient=True, disable=not shown, redirect_stdout=one_screen
+            *columns,
+            console=console,
+            transient=True,
+            disable=not shown,
+            redirect_stdout=one_screen,
+            auto_refresh=False,
         )
         self._task = self._progress.add_task("", total=None)
 
     def show(self, state: str, done: float, planned: float) -> None:
         """``done`` of ``planned``; as long as nothing is planned the bar only moves."""
         self._progress.start()
-        self._progress.update(self._task, description=state, completed=done, total=planned or None)
+        self._progress.update(self._task, description=state, completed=done, total=planned or None, refresh=True)
 
     def close(self) -> None:
         """Take it away."""

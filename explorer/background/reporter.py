@@ -15,6 +15,7 @@ from __future__ import annotations
 import json
 import logging
 import secrets
+import shlex
 import sys
 import time
 from collections import deque
@@ -23,13 +24,13 @@ from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from contextvars import ContextVar
 from dataclasses import replace
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import IO, Self
 
 from doe.errors import StudyStopped
 from doe.pour_runner import Pours
 from explorer.background.progress import PROGRESS, Bar, Ending, ProgressEvent
+from explorer.files.output_file import write_whole
 from explorer.scene.text import material_toml
 from solver import Job, PourBrokeOff, Record, Scene
 
@@ -74,6 +75,7 @@ class Reporter:
         self._started, self._said = clock(), 0.0
         self._out: Path | None = None
         self._last = ProgressEvent(stage="", done=0, planned=0)
+        self._diverged = 0
         self._scenes: dict[int, Path] = {}
         self._place_of_bar, self._every = bar or sys.stdout, every
         self._bar: Bar | None = None
@@ -100,6 +102,7 @@ class Reporter:
         """The command is at work, in the folder ``out``: events and log are added to the files there."""
         self._out = out
         if out is not None:
+            _end_line(out / PROGRESS)
             handler = LogFile(out / LOG, encoding="utf-8")
             self._stack.callback(handler.close)
             self._stack.enter_context(logged(handler, "info"))
@@ -149,24 +152,25 @@ class Reporter:
         self._leave(scene, seed, what, folder, appears_as)
 
     def _leave(self, scene: Scene, seed: int, what: str, folder: Path | None, appears_as: Path | None = None) -> None:
-        if len(self._scenes) >= MOST_SCENES:
+        if self._diverged >= MOST_SCENES:
             return
+        self._diverged += 1
+        last = "; further ones are not told" if self._diverged == MOST_SCENES else ""
         if folder is None:
-            self.say(f"{what}; it does so again by `explorer simulate` of this scene with --seed {seed}")
+            self.say(f"{what}; to reproduce it, run `explorer simulate` with this scene and --seed {seed}{last}")
             return
         name = f"diverged_{seed}.toml"
         path = (appears_as or folder) / name
-        again = f"explorer simulate {path} --seed {seed}"
-        heading = f"{what[0].upper()}{what[1:]}. Again:\n{again}"
-        (folder / name).write_text(material_toml(scene, heading), encoding="utf-8")
+        again = f"explorer simulate {shlex.quote(str(path))} --seed {seed}"
+        heading = f"{what[0].upper()}{what[1:]}. To reproduce it:\n{again}"
+        write_whole(folder / name, material_toml(scene, heading))
         self._scenes[seed] = path
-        last = "; the scenes of further ones are not written" if len(self._scenes) == MOST_SCENES else ""
-        self.say(f"{what}; again: {again}{last}")
+        self.say(f"{what}; to reproduce it: {again}{last}")
 
     def _write(self, event: ProgressEvent) -> None:
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
         self._last = replace(event, run_id=self.run_id, command=self.command, at=now, time=self.elapsed)
-        line = json.dumps(self._last.to_dict(), ensure_ascii=False) + "\n"
+        line = json.dumps(self._last.to_dict()) + "\n"
         if self._out is not None:
             with (self._out / PROGRESS).open("a", encoding="utf-8") as file:
                 file.write(line)
@@ -198,7 +202,8 @@ class Reporter:
         last = replace(self._last, event="end", eta_s=None, line=None, run=None, scene=None)
         # On a full disk, or with nobody who reads, the first error is the one to tell.
         with suppress(OSError) if error is not None else nullcontext():
-            self._write(replace(last, outcome=outcome, result=self.result, error=told))
+            result = self.result if error is None else None
+            self._write(replace(last, outcome=outcome, result=result, error=told))
         # The traceback of what is an error of the program, not of its input or of what the runs gave.
         program = None if isinstance(error, ValueError | KeyboardInterrupt | StudyStopped) else error
         _log.log(
@@ -212,10 +217,21 @@ class Reporter:
         )
 
 
+def _end_line(file: Path) -> None:
+    """End the last line of ``file``, in whose middle a command may have been killed."""
+    if file.is_file() and not (told := file.read_bytes()).endswith(b"\n") and told:
+        with file.open("a", encoding="utf-8") as stream:
+            stream.write("\n")
+
+
 def reporter_of(command: str, json: bool) -> Reporter:
     """That of a command line: events on standard output, and lines on standard error, where it asks for ``json``."""
-    people = sys.stderr if json else sys.stdout
-    return Reporter(command, partial(print, file=people, flush=True), sys.stdout if json else None, people)
+
+    def say(line: str) -> None:
+        # Looked up for each line: while a bar is shown, another stream stands there that prints above it.
+        print(line, file=sys.stderr if json else sys.stdout, flush=True)
+
+    return Reporter(command, say, sys.stdout if json else None, sys.stderr if json else sys.stdout)
 
 
 class ToPerson(logging.Handler):
@@ -253,7 +269,7 @@ class JsonLines(logging.Formatter):
         }
         if record.exc_info:
             entry["traceback"] = self.formatException(record.exc_info)
-        return json.dumps(entry, ensure_ascii=False)
+        return json.dumps(entry)
 
 
 @contextmanager

@@ -8,7 +8,7 @@ NOT_READY = 1
 
 
 def doctor(
-    port: int = typer.Option(8080, min=1, max=65535, help="Port that the page is to have."),
+    port: int = typer.Option(8080, min=1, max=65535, help="Port to check for the page."),
     json: bool = typer.Option(False, "--json", help="Print plain data."),
 ) -> None:
     """Say what this machine has, what is missing, what that limits and how to get it.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import os
+import signal
 from collections import deque
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -85,6 +86,8 @@ def simulate(
     from solver.rigs import BENCH_RIGS
     from solver.single_body import run_bench_test
 
+    # A command that CI cancels tells its end, like one that is stopped by Ctrl-C.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     if json and events:
         raise CommandError("--json prints the result, --events what happens meanwhile; name one of them")
     check_scheduler(scheduler, threads)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 import typer
@@ -62,6 +63,8 @@ def validate_diagnosis(
         scheduler=scheduler,
         laboratory=laboratory or TREFOILS,
     )
+    # A command that CI cancels tells its end, like one that is stopped by Ctrl-C.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     with reporter_of("validate-diagnosis", json) as reporter:
         out.mkdir(parents=True, exist_ok=True)
         reporter.begin(out, resumed=(out / SETS).exists())

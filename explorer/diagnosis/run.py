@@ -101,6 +101,7 @@ def run_diagnose(order: DiagnoseOrder, reporter: Reporter) -> DiagnosisResult:
         if (finished := None if order.resume else _finished(order)) is not None:
             reporter.say(f"{order.out}: finished already; only recorded")
             _recorded(order.record, finished, reporter.say)
+            reporter.result = order.out / finished.NAME
             return finished
     unknown = [name for name in order.effects if name not in EFFECTS]
     if unknown:
@@ -143,8 +144,8 @@ def _run(
         )
     result = result_of(measurement, order, found, reporter.elapsed)
     text = json.dumps(result.to_dict(), ensure_ascii=False, allow_nan=False, indent=1)
+    write_whole(order.out / result.NAME, text + "\n")
     reporter.result = order.out / result.NAME
-    write_whole(reporter.result, text + "\n")
     missing = write_report(diagnosis_report(result), order.out, {result.NAME: text + "\n"})
     say(f"{order.out}/report.html, report.md, {result.NAME}")
     if missing:

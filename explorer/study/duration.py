@@ -26,8 +26,6 @@ SETTLING = 1.1
 """Simulated time [s] from the last body's entry to rest; mean of the same pours."""
 WORKER_GB = 0.25
 """Resident memory of a process that pours, with a study's few hundred bodies [GB]: 0.22 to 0.23 of the shipped ones."""
-
-
 SPHERE_GB = 3.3e-6
 """Further memory for each member sphere [GB]: a funnel of 162 358 spheres takes 0.79 GB, one of 160 takes 0.25."""
 LONG = 600.0

@@ -102,6 +102,7 @@ def run_study(order: StudyOrder, reporter: Reporter) -> StudyResult:
         if (finished := None if order.resume else _finished(order.out, study.file, profile.name)) is not None:
             reporter.say(f"{order.out}: finished already; only recorded")
             _record_piles(order.piles, finished, reporter.say)
+            reporter.result = order.out / RESULT
             return finished
     photographed = given_target(order)
     if photographed is not None:
@@ -166,8 +167,8 @@ def _run(
     result = replace(result_of(study, profile, found, reporter.elapsed, order.tries, about), piles=piles)
     text = json.dumps(result.to_dict(), ensure_ascii=False, allow_nan=False, indent=1)
     # First and by itself: a report that cannot be written costs no study.
+    write_whole(order.out / RESULT, text + "\n")
     reporter.result = order.out / RESULT
-    write_whole(reporter.result, text + "\n")
     missing = write_report(result, order.out, {"result.json": text + "\n"})
     partial.remove()
     say(f"{order.out}/report.html, report.md, result.json")

@@ -29,7 +29,7 @@ import websockets.asyncio.server
 from viser import _messages
 
 from explorer.errors import CommandError
-from explorer.viewer.incoming import MOST_BROWSERS, MOST_MESSAGE_BYTES, MOST_QUEUED, Incoming
+from explorer.viewer.incoming import MOST_MESSAGE_BYTES, MOST_QUEUED, MOST_SOCKETS, Incoming
 from explorer.viewer.shell.channel import PATH, ShellChannel
 from explorer.viewer.shell.web_pages import WebPages
 
@@ -86,7 +86,7 @@ def guarded_server(
             if channel is not None and connection.request.path == PATH:
                 await channel.handle(connection)
             else:
-                await incoming.hear(connection, handler)
+                await incoming.handle(connection, handler)
 
         options["process_request"] = _for_hosts(hosts, token, pages, options["process_request"])
         options |= {"max_size": MOST_MESSAGE_BYTES, "max_queue": MOST_QUEUED, "logger": _quiet_logger()}
@@ -183,15 +183,19 @@ def _for_hosts(
 ) -> Callable[[Any, Any], Any]:
     """The answer of ``pages``, or viser's ``answer`` (to an HTTP request or the opening of a WebSocket), for ``hosts``
     and whoever knows the ``token``; 421 for others, 401 and a form for those without a token."""
-    pass_ = None if token is None else hmac.new(token.encode(), b"page", sha256).hexdigest()
+    cookie_value = None if token is None else hmac.new(token.encode(), b"page", sha256).hexdigest()
 
     def process_request(connection: Any, request: Any) -> Any:
         named = [name.lower() for name in request.headers.get_all("Host")]
         if len(named) != 1 or named[0] not in hosts:
             return connection.respond(HTTPStatus.MISDIRECTED_REQUEST, "This server has another name.\n")
-        if token is not None and pass_ is not None and not _shown(request, cookie_name(token), pass_):
-            return _admitted(connection, request, token, pass_)
-        if "Upgrade" in request.headers and len(connection.server.connections) >= MOST_BROWSERS:
+        if (
+            token is not None
+            and cookie_value is not None
+            and not _has_cookie(request, cookie_name(token), cookie_value)
+        ):
+            return _login_response(connection, request, token, cookie_value)
+        if "Upgrade" in request.headers and len(connection.server.connections) >= MOST_SOCKETS:
             return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "Too many browsers are at this page.\n")
         own = None if pages is None else pages.answer(request)
         return answer(connection, request) if own is None else own
@@ -204,16 +208,16 @@ def cookie_name(token: str) -> str:
     return f"explorer_{sha256(token.encode()).hexdigest()[:8]}"
 
 
-def _shown(request: Any, name: str, pass_: str) -> bool:
+def _has_cookie(request: Any, name: str, cookie_value: str) -> bool:
     """Whether a browser sends the cookie ``name`` that it got for the token."""
     try:
         cookies = SimpleCookie("; ".join(request.headers.get_all("Cookie")))
     except CookieError:
         return False
-    return name in cookies and hmac.compare_digest(cookies[name].value.encode(), pass_.encode())
+    return name in cookies and hmac.compare_digest(cookies[name].value.encode(), cookie_value.encode())
 
 
-def _admitted(connection: Any, request: Any, token: str, pass_: str) -> Any:
+def _login_response(connection: Any, request: Any, token: str, cookie_value: str) -> Any:
     """To an address with the token: the cookie, and the same address without it. To others: a form for it."""
     path, _, query = request.path.partition("?")
     asked = parse_qsl(query, keep_blank_values=True)
@@ -228,7 +232,7 @@ def _admitted(connection: Any, request: Any, token: str, pass_: str) -> Any:
         # One slash: with two, what follows would be another server.
         response.headers["Location"] = "/" + path.lstrip("/\\") + (f"?{rest}" if rest else "")
         kept = f"Max-Age={COOKIE_DAYS * 86400}; Path=/; HttpOnly; SameSite=Lax"
-        response.headers["Set-Cookie"] = f"{cookie_name(token)}={pass_}; {kept}"
+        response.headers["Set-Cookie"] = f"{cookie_name(token)}={cookie_value}; {kept}"
     response.headers["Cache-Control"] = "no-store"
     return response
 

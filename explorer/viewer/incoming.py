@@ -21,7 +21,7 @@ import viser
 from msgspec import Meta, Struct
 from viser import _messages
 
-MOST_BROWSERS = 32
+MOST_SOCKETS = 32
 """Sockets of pages at one time; a page has two."""
 MESSAGES_PER_SECOND, MESSAGES_AT_ONCE = 250, 500
 """Of one browser: a camera and a slider that are dragged send 60 each a second."""
@@ -143,8 +143,8 @@ class Picture(Struct, frozen=True, forbid_unknown_fields=True, tag_field="type",
         return head is not None and 0 < int.from_bytes(head[1], "big") * int.from_bytes(head[2], "big") <= MOST_PIXELS
 
 
-Said: TypeAlias = Camera | Click | Update | Key | UploadStart | UploadPart | Picture
-READER: msgspec.msgpack.Decoder[Said] = msgspec.msgpack.Decoder(Said)
+ClientMessage: TypeAlias = Camera | Click | Update | Key | UploadStart | UploadPart | Picture
+READER: msgspec.msgpack.Decoder[ClientMessage] = msgspec.msgpack.Decoder(ClientMessage)
 
 
 class Refusal(Exception):
@@ -162,7 +162,7 @@ class Upload:
     parts_left: set[int]
 
 
-class Pace:
+class RateLimit:
     """Makes whoever sends faster than ``MESSAGES_PER_SECOND`` wait: what is not read, TCP holds back."""
 
     def __init__(self) -> None:
@@ -182,21 +182,21 @@ class Incoming:
 
     def __init__(self) -> None:
         self.server: viser.ViserServer | None = None
-        self._speakers: list[Speaker] = []
+        self._connections: list[FilteredConnection] = []
 
     @property
     def uploading(self) -> int:
         """[bytes] of files of all browsers that are not whole yet."""
-        return sum(speaker.uploading for speaker in self._speakers)
+        return sum(one.uploading for one in self._connections)
 
-    async def hear(self, connection: Any, handler: Callable[[Any], Awaitable[None]]) -> None:
+    async def handle(self, connection: Any, handler: Callable[[Any], Awaitable[None]]) -> None:
         """Let viser's ``handler`` talk to the browser behind ``connection`` until that goes."""
-        speaker = Speaker(connection, self)
-        self._speakers.append(speaker)
+        one = FilteredConnection(connection, self)
+        self._connections.append(one)
         try:
-            await handler(speaker)
+            await handler(one)
         finally:
-            self._speakers.remove(speaker)
+            self._connections.remove(one)
 
     def control(self, uuid: str) -> Any:
         """The control with this id that a person could use now; None where there is none."""
@@ -212,7 +212,7 @@ class Incoming:
             if not isinstance(message, _messages.FileTransferPartAck):
                 to_all(message)
                 return
-            sender = next((one for one in self._speakers if message.transfer_uuid in one.sent), None)
+            sender = next((one for one in self._connections if message.transfer_uuid in one.sent), None)
             client = None if sender is None else sender.client
             if client is not None:
                 client._websock_connection.queue_message(message)
@@ -220,11 +220,11 @@ class Incoming:
         server._websock_server.queue_message = queue  # type: ignore[method-assign]
 
 
-class Speaker:
+class FilteredConnection:
     """A connection of which viser reads only what a person at the page could have sent."""
 
     def __init__(self, connection: Any, incoming: Incoming) -> None:
-        self._connection, self._incoming, self._pace = connection, incoming, Pace()
+        self._connection, self._incoming, self._pace = connection, incoming, RateLimit()
         self._present = False
         self._uploads: dict[str, Upload] = {}
         self.sent: list[str] = []
@@ -264,7 +264,7 @@ class Speaker:
                 if said is not None:
                     return msgspec.msgpack.encode(said)
 
-    def _accepted(self, said: Said) -> Said | None:
+    def _accepted(self, said: ClientMessage) -> ClientMessage | None:
         """``said`` as viser may read it; None for what is left out. Raises Refusal."""
         if isinstance(said, Camera):
             self._present |= said.looks_somewhere
@@ -274,7 +274,7 @@ class Speaker:
         match said:
             case Update(uuid=uuid, updates=updates):
                 control = self._incoming.control(uuid)
-                fitting = None if control is None else fitted(control, updates.value)
+                fitting = None if control is None else valid_value(control, updates.value)
                 return None if fitting is None else Update(uuid, Updates(fitting))
             case UploadStart():
                 return self._announced(said)
@@ -317,7 +317,7 @@ class Speaker:
         return part
 
 
-def fitted(control: Any, value: Any) -> Any:
+def valid_value(control: Any, value: Any) -> Any:
     """``value`` as ``control`` may have it: of its type, within its bounds, one of its options; None for another."""
     match control:
         case viser.GuiUploadButtonHandle():

@@ -51,7 +51,7 @@ class WorkerLost(RuntimeError):
 
 
 class PourBrokeOff(RuntimeError):
-    """A pour ended by an error of the program; ``job`` is the one that does so again."""
+    """A pour ended by an error of the program; ``job`` reproduces it."""
 
     def __init__(self, job: Job, error: BaseException) -> None:
         super().__init__(f"a pour broke off: {error!r}; seed {job.seed} of {job.scene.title!r}")
@@ -85,7 +85,7 @@ class WorkerPool:
                     f"{LOSSES} worker processes have ended over the same pour, seed {job.seed} of {job.scene.title!r}: "
                     "killed from outside, or out of memory"
                 )
-            again = f"the pour with seed {job.seed} of {job.scene.title!r} is begun again by another"
+            again = f"the pour with seed {job.seed} of {job.scene.title!r} is restarted on another worker"
             _log.warning("a worker process has ended (%d of %d losses): %s", losses[id(job)], LOSSES, again)
             queue.appendleft(job)
             return self._with_room(self._another(pipe), needed)

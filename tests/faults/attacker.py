@@ -221,7 +221,7 @@ def wrong_values(server):
         if isinstance(handle, viser.GuiUploadButtonHandle) or not hasattr(handle, "disabled"):
             continue
         value, told = list(handle.value) if isinstance(handle.value, tuple) else handle.value, handle._impl
-        if incoming.fitted(handle, value) is None or told.removed or not isinstance(told.update_cb, list):
+        if incoming.valid_value(handle, value) is None or told.removed or not isinstance(told.update_cb, list):
             yield handle.label, handle.value
 
 

@@ -16,7 +16,7 @@ from explorer.laboratory.command_results import CommandResult
 from explorer.project.project import REPORT
 from explorer.tables.photograph import Rows
 from explorer.viewer.actions import Post
-from explorer.viewer.output.send_file import send_file
+from explorer.viewer.output.send_file import send_files
 from explorer.viewer.study.plot_view import PlotView
 from explorer.viewer.view import small_html
 
@@ -85,8 +85,7 @@ class AnswerView:
     def _send(self, client: Any) -> None:
         if self._answer is None:
             raise CommandError("there is no answer yet")
-        for name, content in self._answer.files.items():
-            send_file(client, name, content)
+        send_files(client, self._answer.files)
 
 
 def answer_html(answer: CommandResult, kept: str = "") -> str:

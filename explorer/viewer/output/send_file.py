@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +15,23 @@ MOST_SENT = 200_000_000
 
 
 def send_file(client: Any, name: str, content: bytes) -> None:
-    """Have a browser keep ``content`` as a file called ``name``.
+    """Have a browser keep ``content`` as a file called ``name``. Raises CommandError as :func:`send_files`."""
+    send_files(client, {name: content})
 
-    Raises CommandError while one before it is on its way: a browser that takes none would have them pile up here.
+
+def send_files(client: Any, files: Mapping[str, bytes]) -> None:
+    """Have a browser keep ``files``, name → content.
+
+    Raises CommandError while earlier ones are on their way: a browser that takes none would have them pile up here.
     """
     buffer = client._websock_connection.get_message_buffer()
     with buffer.buffer_lock:
         waiting = any(isinstance(one, _messages.FileTransferPart) for one in buffer.message_from_id.values())
     if waiting:
-        raise CommandError(f"{name}: this browser has not received the file before it yet")
-    # At once: otherwise a person gets a link in a notification, and has to press it.
-    client.send_file_download(name, content, save_immediately=True)
+        raise CommandError(f"{', '.join(files)}: this browser has not received the file before it yet")
+    for name, content in files.items():
+        # At once: otherwise a person gets a link in a notification, and has to press it.
+        client.send_file_download(name, content, save_immediately=True)
 
 
 def refuse_large(files: Sequence[Path]) -> None:

@@ -16,7 +16,7 @@ from typing import Any
 import websockets
 from websockets.asyncio.server import ServerConnection
 
-from explorer.viewer.incoming import Pace
+from explorer.viewer.incoming import RateLimit
 
 PATH = "/shell/channel"
 LONGEST_COMMAND = 2500
@@ -82,7 +82,7 @@ class ShellChannel:
         with self._lock:
             self._waiting[connection] = asyncio.get_running_loop(), changed
         teller = asyncio.create_task(self._tell_changes(connection, changed))
-        pace = Pace()
+        pace = RateLimit()
         try:
             async for message in connection:
                 await pace.wait()

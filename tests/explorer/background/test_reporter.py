@@ -4,14 +4,14 @@ import io
 import logging
 import math
 from collections import deque
-from contextlib import suppress
+from contextlib import redirect_stdout, suppress
 from dataclasses import replace
 
 import pytest
 
 from doe.declared.pours import Ended
 from explorer.background.progress import PROGRESS, PourProgress, SetProgress
-from explorer.background.reporter import LOG, MOST_SCENES, Reporter
+from explorer.background.reporter import LOG, MOST_SCENES, Reporter, reporter_of
 from explorer.errors import CommandError
 from explorer.scene.file import load_scene
 from solver import Job, Outcome, PourBrokeOff, pour_key
@@ -142,3 +142,27 @@ def test_a_log_level_puts_the_log_on_standard_error(tmp_path):
     assert explorer("--log-level", "warning", *sets).stderr == ""
     assert logging.getLogger("explorer").handlers == []
     assert "allowed: debug, info" in refused(explorer("--log-level", "loud", *sets))
+
+
+def test_lines_go_where_standard_output_is_now():
+    """While a bar is shown, rich stands there and prints above it."""
+    reporter = reporter_of("repeat", json=False)
+    with redirect_stdout(io.StringIO()) as above_the_bar:
+        reporter.say("found it")
+    assert above_the_bar.getvalue() == "found it\n"
+
+
+def test_a_name_that_is_no_utf_8_ends_nothing(tmp_path, monkeypatch):
+    # pytest would hand the log on from one of its processes to the other, which cannot be done with such a name.
+    monkeypatch.setattr(logging.getLogger("explorer"), "propagate", False)
+    folder = tmp_path / "b\udcff"
+    folder.mkdir()
+    told = Told(folder)
+    assert told.events[-1]["result"] == str(folder / "diagnosis.json")
+    assert Told(tmp_path, CommandError("b\udcff: no such folder")).events[-1]["error"] == "b\udcff: no such folder"
+
+
+def test_half_a_line_of_a_command_that_was_killed_costs_no_event_of_the_next(tmp_path):
+    (tmp_path / PROGRESS).write_text('{"event": "po')
+    told = Told(tmp_path)
+    assert lines_of((tmp_path / PROGRESS).read_text().partition("\n")[2]) == told.events

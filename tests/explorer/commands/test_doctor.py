@@ -109,8 +109,19 @@ def test_what_is_missing_and_not_needed_leaves_it_ready():
     lines = examined_text([absent, there]).splitlines()
     assert lines[1].split() == ["Dask", "missing", "no", "module", "distributed", "--scheduler", "pip", "install"]
     assert lines[2].split() == ["Python", "present", "3.11"]
-    assert lines[-1] == "ready: pouring, calibrating, diagnosing and the page work; missing that not everybody needs: 1"
+    assert lines[-1] == "ready: pouring, calibrating, diagnosing and the page work; optional items missing: 1"
 
 
 def test_a_port_that_there_is_not_is_refused():
     assert "--port" in refused(explorer("doctor", "--port", 70000))
+
+
+def test_a_folder_below_one_that_may_not_be_searched_is_a_row(home, monkeypatch):
+    def exists(path, **_):
+        if path.is_relative_to(home):
+            raise PermissionError(13, "Permission denied", str(path))
+        return True
+
+    monkeypatch.setattr("pathlib.Path.exists", exists)
+    found = installation._folder("folder of pours", home / "below", "pours", "--store FILE")
+    assert (found.present, found.found) == (False, f"{home / 'below'}: {home / 'below'}: Permission denied")

@@ -72,11 +72,22 @@ PASSWORDS = "/etc/passwd"
         ("measurement.toml", 'role = "fit"', f'role = "fit"\nmaterial = "{PASSWORDS}"', "condition.material"),
         ("material.toml", "{ sphere = 12e-3 }", f'{{ file = "{PASSWORDS}", unit = "mm" }}', "material"),
         ("material.toml", 'material = "glass"\n', f'material = "glass"\nfile = "{PASSWORDS}"\n', "material"),
+        ("material.toml", 'material = "glass"\n', 'material = "glass"\nfile = "body.toml"\n', "material"),
+        ("material.toml", "[[body]]", f'[rig]\nmesh = "{PASSWORDS}"\n[[body]]', "material"),
+        ("material.toml", "[[body]]", '[rig]\nmesh = "~/../../../../../etc/passwd"\n[[body]]', "material"),
+        (
+            "measurement.toml",
+            "mass = 0.014",
+            f'mesh = "{PASSWORDS}"',
+            "condition.rig_parameters.mesh",
+        ),
     ],
 )
 def test_an_archive_from_a_browser_names_no_file_of_this_machine(tmp_path, file, old, new, key):
     texts = {"measurement.toml": MEASUREMENT, "material.toml": MATERIAL}
     folder = write(tmp_path / "set", {file: changed(texts[file], old, new)})
+    body = f'format = 1\n[[body]]\nname = "bead"\nshape = {{ mesh = "{PASSWORDS}", unit = "mm" }}\n'
+    (folder / "body.toml").write_text(body, encoding="utf-8")
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w") as archive:
         for path in folder.iterdir():
@@ -85,3 +96,11 @@ def test_an_archive_from_a_browser_names_no_file_of_this_machine(tmp_path, file,
         unpacked_measurement("set.zip", packed.getvalue(), tmp_path / "kept")
     assert "root:" not in str(refused.value)
     assert list((tmp_path / "kept").iterdir()) == []
+
+
+def test_links_in_a_circle_are_no_traceback(tmp_path):
+    folder = write(tmp_path / "set")
+    (folder / "scans").mkdir()
+    (folder / "scans" / "a.npz").symlink_to("b.npz")
+    (folder / "scans" / "b.npz").symlink_to("a.npz")
+    assert outside(load_measurement(folder)) == []

@@ -199,7 +199,7 @@ def test_a_flood_is_read_slowly(monkeypatch):
     monkeypatch.setattr(incoming, "MESSAGES_AT_ONCE", 500)
     monkeypatch.setattr(incoming, "time", SimpleNamespace(monotonic=lambda: clock[0]))
     monkeypatch.setattr(incoming, "asyncio", SimpleNamespace(sleep=sleep))
-    pace, messages = incoming.Pace(), 10_000
+    pace, messages = incoming.RateLimit(), 10_000
     for _ in range(messages):
         with pytest.raises(StopIteration):
             pace.wait().send(None)
@@ -221,7 +221,7 @@ def test_the_page_is_drawn_however_many_actions_come():
 
 
 def test_browsers_are_counted(attacked, attacker, monkeypatch):
-    monkeypatch.setattr(guard, "MOST_BROWSERS", 1)
+    monkeypatch.setattr(guard, "MOST_SOCKETS", 1)
     with pytest.raises(InvalidStatus) as refused:
         Attacker(attacked.server, told=False)
     assert refused.value.response.status_code == 503
@@ -236,18 +236,24 @@ def test_connections_are_counted_before_they_say_a_word(attacked, attacker, monk
 
 def test_who_takes_nothing_is_let_go(monkeypatch):
     """A browser that reads nothing: what is sent to it stays bounded, and after a while it is gone."""
-    monkeypatch.setattr(guard, "ASK_AFTER", 0.5)
-    monkeypatch.setattr(guard, "GIVE_UP_AFTER", 0.5)
-    monkeypatch.setattr(guard, "CUT_AFTER", 0.5)
+    for name in ("ASK_AFTER", "GIVE_UP_AFTER", "CUT_AFTER"):
+        monkeypatch.setattr(guard, name, 2.0)
+    connections, handle = [], guard.Incoming.handle
+
+    def seen(incoming, connection, handler):
+        connections.append(connection)
+        return handle(incoming, connection, handler)
+
+    monkeypatch.setattr(guard.Incoming, "handle", seen)
     server = guarded_server("127.0.0.1", 0, "test")
     try:
         text = server.gui.add_html("")
         _deaf = Attacker(server, max_queue=1)
-        (connection,) = server._websock_server._live_connections.values()
+        wait_for(lambda: connections, 60.0)
         largest = 0
         for k in range(100):
             text.content = f"{k}" + "x" * 1_000_000
-            largest = max(largest, connection.transport.get_write_buffer_size())
+            largest = max(largest, connections[0].transport.get_write_buffer_size())
         wait_for(lambda: not server.get_clients(), 60.0)
         assert largest < 10_000_000
     finally:

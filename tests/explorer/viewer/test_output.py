@@ -14,6 +14,7 @@ from types import SimpleNamespace
 import numpy as np
 import PIL.Image
 import pytest
+from viser import _messages
 
 from explorer.errors import CommandError
 from explorer.live.messages import SessionState
@@ -38,6 +39,7 @@ from explorer.viewer.output.picture import (
 )
 from explorer.viewer.output.recording_panel import DOWNLOAD, REPLAY, START, STOP, RecordingPanel
 from explorer.viewer.output.recording_switch import BYTES_PER_BODY, HTML, RRD, RecordingState, session_recorder
+from explorer.viewer.output.send_file import send_file, send_files
 from explorer.viewer.palette import BODY_COLOURS, STILL, VIRIDIS
 from explorer.viewer.panel import Now
 from tests.explorer.viewer.page_session import PageSession, event, finished, frame_of, page_context
@@ -421,3 +423,20 @@ def test_texts_of_the_state_are_escaped(bench):
     assert bench.actions.carry_out() is None
     assert bench.record("Delete everything") == ""
     assert not bench.recording.running
+
+
+def test_all_files_of_an_answer_are_sent_together():
+    """The buffer of a real browser holds the first file when the second is sent."""
+    browser = Browser()
+    waiting = browser._websock_connection.get_message_buffer().message_from_id
+    send = browser.send_file_download
+
+    def sent(name, content, save_immediately):
+        send(name, content, save_immediately)
+        waiting[len(waiting)] = _messages.FileTransferPart("", len(waiting), b"", "")
+
+    browser.send_file_download = sent
+    send_files(browser, {"part.toml": b"a", "report.html": b"b"})
+    assert browser.sent == {"part.toml": b"a", "report.html": b"b"}
+    with pytest.raises(CommandError, match=r"^later\.csv: this browser has not received"):
+        send_file(browser, "later.csv", b"c")

@@ -43,6 +43,8 @@ with compiled_once([Capacity(worlds=1, bodies=128, members=1024, contacts=16384)
 def folder(tmp_path, monkeypatch):
     """An empty folder of kernels, for this process and those that it starts."""
     monkeypatch.setenv("TI_OFFLINE_CACHE_FILE_PATH", str(tmp_path / "kernels"))
+    # Threads of other tests are none of a command's, and one that wants kernels stands for a process.
+    monkeypatch.setattr(kernel_cache.threading, "active_count", lambda: 1)
     (tmp_path / "kernels").mkdir()
     return tmp_path / "kernels"
 
@@ -131,8 +133,6 @@ def waiting(monkeypatch):
             result.append(mine)
 
     monkeypatch.setattr(kernel_cache.fcntl, "flock", told)
-    # The thread stands for another process, which has one.
-    monkeypatch.setattr(kernel_cache.threading, "active_count", lambda: 1)
     thread = threading.Thread(target=want)
     thread.start()
     assert asks.wait(60)
