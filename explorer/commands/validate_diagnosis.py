@@ -36,7 +36,7 @@ def validate_diagnosis(
     import math
 
     from doe.validation.campaign import SETS, CampaignOrder, run_campaign
-    from doe.validation.laboratory import TREFOILS
+    from doe.validation.laboratory import TREFOILS, read_laboratory
     from explorer.background.progress import SetProgress
     from explorer.background.reporter import reporter_of
     from explorer.errors import CommandError
@@ -63,6 +63,8 @@ def validate_diagnosis(
         scheduler=scheduler,
         laboratory=laboratory or TREFOILS,
     )
+    # A wrong file is told before anything is made.
+    read_laboratory(order.laboratory)
     # A command that CI cancels tells its end, like one that is stopped by Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with reporter_of("validate-diagnosis", json) as reporter:

@@ -38,6 +38,13 @@ def test_a_shard_that_there_is_not_is_refused(tmp_path):
         assert "allowed: K/N" in result.output
 
 
+def test_a_wrong_laboratory_leaves_nothing_behind(tmp_path):
+    result = explorer("validate-diagnosis", "--out", tmp_path / "out", "--laboratory", tmp_path / "none.toml")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr == f"error: {tmp_path}/none.toml: no such file\n"
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_an_installed_program_can_run_it(tmp_path):
     """All that the command imports, and the declared model, lie in the packages of a wheel."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
