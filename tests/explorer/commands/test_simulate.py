@@ -118,14 +118,14 @@ def test_table_for_people(record, monkeypatch):
 
 
 @pytest.mark.usefixtures("taichi")
-def test_a_pour_that_diverges_leaves_the_scene_that_does_so_again(tmp_path):
+def test_a_pour_that_diverges_leaves_a_scene_that_reproduces_it(tmp_path):
     wild = TINY | {"material.seed.shear_modulus": "10kPa", "insertion.drop_speed": "10m/s"}
     arguments = ("--seed", 3, "--events", "--out", tmp_path / "run")
     result = explorer("simulate", "funnel", *settings(wild), *arguments)
     _, pour, end = checked_events(result.stdout)
     assert (pour["run"]["outcome"], pour["scene"]) == ("overlap_limit", str(tmp_path / "run" / "diverged_3.toml"))
     assert (end["outcome"], end["result"]) == ("finished", str(tmp_path / "run" / "result.json"))
-    assert f"again: explorer simulate {pour['scene']} --seed 3\n" in result.stderr
+    assert f"to reproduce it: explorer simulate {pour['scene']} --seed 3\n" in result.stderr
     assert explorer("simulate", pour["scene"], "--seed", 3, "--out", tmp_path / "again").exit_code == 0
     first, again = (json.loads((tmp_path / name / "result.json").read_text()) for name in ("run", "again"))
     for key in ("outcome", "message", "steps", "parameters"):
