@@ -278,6 +278,7 @@ def main() -> int:
                 print(f"{seed}: {fault}", flush=True)
             tried += 1
         print(f"{name}: {order.inputs} inputs", flush=True)
+    _open.close()  # viser says that it has stopped, and the count is to be the last line
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 - taken
     if grown > MEMORY:
         faults += 1
