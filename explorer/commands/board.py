@@ -6,17 +6,14 @@ from pathlib import Path
 
 import typer
 
+from explorer.commands.serve import HOST, TOKEN
+
 
 def board(
     folder: Path = typer.Argument(help="Output folder of `explorer calibrate` or `explorer diagnose`."),
     port: int = typer.Option(8080, min=0, max=65535, help="Port of the page; 0 takes a free one."),
-    host: str = typer.Option("127.0.0.1", help="Address to listen on; one that others can reach needs a token."),
-    token: str | None = typer.Option(
-        None,
-        envvar="EXPLORER_TOKEN",
-        help="What a browser has to show, 16 characters or more. On the command line other users of this machine can "
-        "read it: better in the environment.",
-    ),
+    host: str = HOST,
+    token: str | None = TOKEN,
 ) -> None:
     """Show verdict, charts, answers and runs of a study or a diagnosis; what still runs is followed."""
     from explorer.viewer.app import board as serve_board

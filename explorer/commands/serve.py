@@ -6,17 +6,21 @@ from pathlib import Path
 
 import typer
 
+HOST = typer.Option("127.0.0.1", help="Address to listen on; one that others can reach needs a token.")
+TOKEN = typer.Option(
+    None,
+    envvar="EXPLORER_TOKEN",
+    help="What a browser has to show, 16 characters or more. On the command line other users of this machine can "
+    "read it: better in the environment.",
+)
+"""Of every command that opens a page."""
+
 
 def serve(
     project: Path | None = typer.Argument(None, help="Folder of a project, as `explorer new project` makes it."),
     port: int = typer.Option(8080, min=0, max=65535, help="Port of the page; 0 takes a free one."),
-    host: str = typer.Option("127.0.0.1", help="Address to listen on; one that others can reach needs a token."),
-    token: str | None = typer.Option(
-        None,
-        envvar="EXPLORER_TOKEN",
-        help="What a browser has to show, 16 characters or more. On the command line other users of this machine can "
-        "read it: better in the environment.",
-    ),
+    host: str = HOST,
+    token: str | None = TOKEN,
     study: str | None = typer.Option(None, help="Study for the page's calibration: file or shipped name."),
     material: str | None = typer.Option(None, help="Material to pour and calibrate: file or shipped name."),
     set_: list[str] = typer.Option([], "--set", metavar="PATH=VALUE", help="Set a parameter; may be repeated."),

@@ -26,6 +26,13 @@ CAMERA = {
 }
 
 
+def messages_in(raw):
+    """The messages of a window, as viser sends it: two lengths, then what is compressed."""
+    size, packed = int.from_bytes(raw[:8], "little"), int.from_bytes(raw[8:16], "little")
+    text = zstandard.ZstdDecompressor().decompress(raw[16 : 16 + packed], size)
+    return msgspec.msgpack.decode(text)["messages"]
+
+
 class Socket:
     """A client of the page. Keeps the labels of the inputs, what sliders reach, and the texts that it was sent last."""
 
@@ -37,10 +44,7 @@ class Socket:
 
     async def window(self):
         """The messages of the next window."""
-        raw = await self._socket.recv()
-        size, packed = int.from_bytes(raw[:8], "little"), int.from_bytes(raw[8:16], "little")
-        text = zstandard.ZstdDecompressor().decompress(raw[16 : 16 + packed], size)
-        messages = msgspec.msgpack.decode(text)["messages"]
+        messages = messages_in(await self._socket.recv())
         for message in messages:
             props = message.get("props") or {}
             if isinstance(props, dict) and "label" in props:

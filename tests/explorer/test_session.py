@@ -19,21 +19,12 @@ from solver.pours.record import Outcome, Phase
 from solver.scenes.scene import value, with_values
 from solver.scenes.time_step import time_step
 from solver.shapes.solid import Solid
+from tests.explorer.background.waiting import wait_for
 from tests.explorer.beads import MASS, bead_scene
 
-PATIENCE = 60.0
 """Seconds that a process may take to start and compile on a busy machine."""
 FRICTION = "pair.bead.steel.static_friction"
 SHEAR_MODULUS = "material.glass.shear_modulus"
-
-
-def wait_for(condition, patience=PATIENCE):
-    end = time.monotonic() + patience
-    while time.monotonic() < end:
-        if found := condition():
-            return found
-        time.sleep(0.01)
-    raise AssertionError("waited in vain")
 
 
 def wait_for_state(session, *states):

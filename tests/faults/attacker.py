@@ -15,7 +15,6 @@ from unittest import mock
 
 import msgspec
 import viser
-import zstandard
 from viser import _messages
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
@@ -24,22 +23,11 @@ from explorer.diagnosis.process import DiagnoseProcess
 from explorer.viewer import incoming, page
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.shell.channel import ShellChannel
-from tests.explorer.test_session import wait_for
+from tests.browser.page_socket import CAMERA, messages_in
+from tests.explorer.background.waiting import wait_for
 from tests.explorer.viewer.page_session import page_of
 from tests.explorer.viewer.test_page import SOURCE, Session
 
-CAMERA = {
-    "type": "ViewerCameraMessage",
-    "wxyz": (1.0, 0.0, 0.0, 0.0),
-    "position": (1.0, 0.0, 0.0),
-    "fov": 0.6,
-    "near": 0.01,
-    "far": 100.0,
-    "image_height": 600,
-    "image_width": 800,
-    "look_at": (0.0, 0.0, 0.0),
-    "up_direction": (0.0, 0.0, 1.0),
-}
 NAN, INFINITE = float("nan"), float("inf")
 HOSTILE = (
     *(NAN, INFINITE, -INFINITE, 1e308, -1e308, 5e-324, -0.0, 2**63, -(2**63), 10**6, -1),
@@ -110,10 +98,7 @@ class Attacker:
     def _read_controls(self):
         found = []
         while True:
-            raw = self.socket.recv(60.0)
-            size, packed = int.from_bytes(raw[:8], "little"), int.from_bytes(raw[8:16], "little")
-            text = zstandard.ZstdDecompressor().decompress(raw[16 : 16 + packed], size)
-            for message in msgspec.msgpack.decode(text)["messages"]:
+            for message in messages_in(self.socket.recv(60.0)):
                 if message["type"] == "ReplayDoneMessage":
                     return found
                 if "props" in message and message["type"].startswith("Gui"):

@@ -26,7 +26,7 @@ from explorer.viewer.output.send_file import send_file
 from explorer.viewer.shell.channel import PATH, ShellChannel
 from explorer.viewer.shell.web_pages import WebPages
 from solver.scenes.scene import check, parameters, value
-from tests.explorer.test_session import wait_for
+from tests.explorer.background.waiting import wait_for
 from tests.faults.attacker import (
     NO_MESSAGES,
     Attacker,

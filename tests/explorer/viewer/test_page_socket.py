@@ -25,8 +25,8 @@ from explorer.viewer.look.camera import LINK, view_of
 from explorer.viewer.shell.channel import PATH, ShellChannel
 from explorer.viewer.shell.timeline import BACK, PLAY_PAUSE, STEP
 from solver.scenes.scene import with_values
+from tests.explorer.background.waiting import wait_for
 from tests.explorer.beads import bead_scene
-from tests.explorer.test_session import wait_for
 from tests.explorer.viewer.page_session import page_of
 
 
