@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 from doe.studies.study_result import StudyResult
 from explorer.report.content import Table
@@ -20,7 +19,6 @@ from explorer.units import (
 )
 
 EFFECTS_SHOWN = 12
-Cell = Callable[[StudyResult], str]
 
 
 def comparison(one: StudyResult, other: StudyResult, names: tuple[str, str]) -> tuple[Table, Table, Table]:
@@ -29,20 +27,53 @@ def comparison(one: StudyResult, other: StudyResult, names: tuple[str, str]) -> 
 
 
 def _findings(one: StudyResult, other: StudyResult, names: tuple[str, str]) -> Table:
-    rows: tuple[tuple[str, Cell], ...] = (
-        ("study, profile", lambda r: f"{r.study.name}, {r.study.profile.name}"),
-        ("target", _target),
-        ("pours", lambda r: f"{r.runs.total}, {r.runs.valid} valid"),
-        ("σ of one pour", lambda r: observed(_of(r), r.pilot.noise[_of(r)].sigma)),
-        ("significant (Holm)", lambda r: enumeration(r.screening.analysis.significant())),
-        ("R², predicted R²", _fit),
-        ("predicted at the optimum", _predicted),
-        ("better than noise", lambda r: "yes" if r.optimum.single.better_than_noise else "no"),
-        ("verification", _verified),
-        ("difference from the target", _difference),
-        ("verdict", lambda r: r.verification.tests[0].verdict),
+    both = (one, other)
+    observables = list(dict.fromkeys(target.observable for result in both for target in result.study.targets))
+    rows = [
+        ("study, profile", *(f"{r.study.name}, {r.study.profile.name}" for r in both)),
+        ("pours", *(f"{r.runs.total}, {r.runs.valid} valid" for r in both)),
+        ("significant (Holm)", *(enumeration(r.screening.analysis.significant()) for r in both)),
+    ]
+    for observable in observables:
+        found = [_of_target(result, observable) for result in both]
+        of = f"{observable_label(observable)}: " if len(observables) > 1 else ""
+        rows += [
+            (f"{of}{title}", *(cells.get(title, MISSING) for cells in found))
+            for title in dict.fromkeys(title for cells in found for title in cells)
+        ]
+    return Table(("", *names), tuple(rows), "95 % intervals.")
+
+
+def _of_target(result: StudyResult, observable: str) -> dict[str, str]:
+    """Title → what ``result`` says of its target ``observable``; nothing where it has no such target."""
+    order = [target.observable for target in result.study.targets]
+    if observable not in order:
+        return {}
+    k = order.index(observable)
+    target, anova, test = result.study.targets[k], result.surface.anova[k], result.verification.tests[k]
+    noise, sample, unit = result.pilot.noise.get(observable), test.simulated, unit_of_observable(observable)
+    cells = {
+        "target": f"{observable_label(observable)} {observed(observable, target.mean)}, margin "
+        f"{observed(observable, target.margin)}",
+        "σ of one pour": MISSING if noise is None else observed(observable, noise.sigma),
+        "R², predicted R²": f"{fixed(anova.r_squared)}, {fixed(anova.r_squared_predicted)}",
+    }
+    compromise, single = result.optimum.compromise, result.optimum.single
+    if compromise is not None:
+        cells["predicted at the optimum"] = observed(observable, float(compromise.predicted[k]))
+    else:
+        ends = " … ".join(observed(observable, end) for end in (single.predicted_low, single.predicted_high))
+        cells["predicted at the optimum"] = f"{observed(observable, single.predicted)} ({ends})"
+        cells["better than noise"] = "yes" if single.better_than_noise else "no"
+    cells["verification"] = (
+        f"{observed(observable, sample.mean)} ± {observed(observable, sample.sd)} (sd), {sample.n} pours"
     )
-    return Table(("", *names), tuple((title, cell(one), cell(other)) for title, cell in rows), "95 % intervals.")
+    if test.deciding is not None:
+        middle, low, high = (
+            unit.of(value) for value in (test.deciding.difference, test.deciding.low, test.deciding.high)
+        )
+        cells["difference from the target"] = f"{unit.attach(signed(middle))} ({signed(low)} … {signed(high)})"
+    return cells | {"verdict": test.verdict}
 
 
 def _optima(one: StudyResult, other: StudyResult, names: tuple[str, str]) -> Table:
@@ -65,40 +96,6 @@ def _effects(one: StudyResult, other: StudyResult, names: tuple[str, str]) -> Ta
     )
     caption = "Low → high, each over its own range, which may differ between the two; the largest ones."
     return Table(("effect", *names), rows, caption)
-
-
-def _of(result: StudyResult) -> str:
-    return result.study.targets[0].observable
-
-
-def _target(result: StudyResult) -> str:
-    target = result.study.targets[0]
-    mean, margin = (observed(target.observable, value) for value in (target.mean, target.margin))
-    return f"{observable_label(target.observable)} {mean}, margin {margin}"
-
-
-def _fit(result: StudyResult) -> str:
-    anova = result.surface.anova[0]
-    return f"{fixed(anova.r_squared)}, {fixed(anova.r_squared_predicted)}"
-
-
-def _predicted(result: StudyResult) -> str:
-    found = result.optimum.single
-    low, high = (observed(_of(result), end) for end in (found.predicted_low, found.predicted_high))
-    return f"{observed(_of(result), found.predicted)} ({low} … {high})"
-
-
-def _verified(result: StudyResult) -> str:
-    sample = result.verification.tests[0].simulated
-    return f"{observed(_of(result), sample.mean)} ± {observed(_of(result), sample.sd)} (sd), {sample.n} pours"
-
-
-def _difference(result: StudyResult) -> str:
-    test, unit = result.verification.tests[0].deciding, unit_of_observable(_of(result))
-    if test is None:
-        return MISSING
-    middle, low, high = (unit.of(value) for value in (test.difference, test.low, test.high))
-    return f"{unit.attach(signed(middle))} ({signed(low)} … {signed(high)})"
 
 
 def _optimum(result: StudyResult) -> dict[str, str]:

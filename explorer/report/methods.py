@@ -6,9 +6,10 @@ Every number in it is one of the result; a source is cited where the text names 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from doe.analysis.verification import Verification
 from doe.designs import DESIGNS as FAMILIES
 from doe.laboratory import LabResult
 from doe.laboratory.analysis import TESTS
@@ -17,6 +18,7 @@ from doe.laboratory.linear_range import STRAIGHTNESS, LinearRange
 from doe.laboratory.result import CONDITIONS
 from doe.provenance import SetUp
 from doe.studies.study_result import StudyResult
+from doe.target import Target
 from explorer.report.content import Reference, Section
 from explorer.report.sources import SOURCES, citations, methods_section, software
 from explorer.units import (
@@ -267,26 +269,39 @@ def _designs(result: StudyResult) -> str:
         "walk of "
         f"steepest ascent{citations(('box1951',))} in {len(result.ascent.means)} steps{together}; and a {surface} "
         f"design of {len(result.surface.design)} points{citations(DESIGNS.get(surface, ()))} over "
-        f"{enumeration(names)}. {_read(result.pilot.estimator, target.observable)}"
+        f"{enumeration(names)}. {_read(result.pilot.estimator, study.targets)}"
     )
 
 
-def _read(screening: str, later: str) -> str:
-    if screening == later:
-        return f"All of them were read by the {observable_label(later)}."
-    first, then = observable_label(screening), observable_label(later)
-    return f"The screening was read by the {first}, all later stages by the {then}."
+def _read(screening: str, targets: Sequence[Target]) -> str:
+    """What the pours were read by: the screening may take another estimator of the first target."""
+    first, *others = (observable_label(target.observable) for target in targets)
+    if screening == targets[0].observable:
+        return f"All of them were read by the {enumeration([first, *others])}."
+    read = enumeration([observable_label(screening), *others])
+    return f"The screening was read by the {read}, all later stages by the {enumeration([first, *others])}."
 
 
 def _tests(result: StudyResult) -> str:
     analysis, stage = result.screening.analysis, result.verification
-    target, test = stage.targets[0], stage.tests[0]
+    pours = enumeration([str(n) for n in sorted({test.simulated.n for test in stage.tests})])
+    found = [_tested(target, test) for target, test in zip(stage.targets, stage.tests, strict=True)]
+    if len(found) > 1:
+        found = [
+            f"for the {observable_label(target.observable)} {one}"
+            for target, one in zip(stage.targets, found, strict=True)
+        ]
+    return (
+        f"Effects were tested against the {analysis.error_source}, corrected by Holm’s "
+        f"procedure{citations(('holm1979',))}. {pours} fresh pours at the chosen setting gave {'; '.join(found)}."
+    )
+
+
+def _tested(target: Target, test: Verification) -> str:
     name = target.observable
     text = (
-        f"Effects were tested against the {analysis.error_source}, corrected by Holm’s "
-        f"procedure{citations(('holm1979',))}. "
-        f"{test.simulated.n} fresh pours at the chosen setting gave {observed(name, test.simulated.mean)} ± "
-        f"{observed(name, test.simulated.sd)} (SD) against {observed(name, target.mean)} measured"
+        f"{observed(name, test.simulated.mean)} ± {observed(name, test.simulated.sd)} (SD) against "
+        f"{observed(name, target.mean)} measured"
     )
     if test.welch is not None:
         text += (
@@ -297,4 +312,4 @@ def _tests(result: StudyResult) -> str:
             f"; equivalence within ± {observed(name, target.margin)} was tested by two one-sided tests"
             f"{citations(('schuirmann1987',))}: {test.verdict}"
         )
-    return f"{text}."
+    return text

@@ -186,7 +186,8 @@ def cautions(result: StudyResult) -> list[str]:
     observable = result.study.targets[0].observable
     if not optimum.reached:
         found.append(
-            f"The target {observed(observable, optimum.target)} lies outside what the model reaches in its region, "
+            f"The target {observed(observable, optimum.target)} ({observable_label(observable)}) lies outside what the "
+            "model reaches in its region, "
             f"{observed(observable, optimum.reachable_low)} … {observed(observable, optimum.reachable_high)}; "
             "the optimum is where it comes nearest."
         )

@@ -41,7 +41,8 @@ def noise(result: StudyResult) -> Section:
     text = f"The screening reads {observable_label(pilot.estimator)}."
     if pilot.choice is not None:
         text = f"{text} {_choice(pilot.choice)}"
-    text += f" Ascent, surface and verification are always compared with the measurement in {observable_label(target)}."
+    compared = enumeration([observable_label(one.observable) for one in result.study.targets])
+    text += f" Ascent, surface and verification are always compared with what was measured: {compared}."
     blocks: list[Block] = [
         Text(text),
         Figure(

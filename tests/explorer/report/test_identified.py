@@ -3,6 +3,7 @@
 import copy
 import re
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import pytest
 
@@ -17,7 +18,8 @@ from explorer.report.design.charts import design_plots
 from explorer.report.figures.model import fitted_targets, ranges
 from explorer.report.html import escaped
 from explorer.report.study_charts import study_plots
-from explorer.units import parameter_range, parameter_value
+from explorer.study.for_ci import errors, junit
+from explorer.units import MISSING, observable_label, observed, parameter_range, parameter_value
 from tests.explorer import reported_studies
 from tests.explorer.command_line import explorer
 from tests.explorer.reported_studies import typed
@@ -173,6 +175,31 @@ def test_two_studies_are_compared_by_what_each_identifies(open_study):
     ):
         words = next(row for label, row in cells.items() if factor["path"].split(".")[-1].replace("_", " ") in label)
         assert words == (f"{feasible} (chosen by rule: {chosen})", f"{chosen} ({confidence_set})")
+
+
+def test_a_study_of_several_targets_is_compared_by_each(open_study):
+    several = typed(reported_studies.result_of_case("two targets"))
+    findings = comparison(several, typed(open_study), ("two", "one"))[0]
+    cells = {row[0]: row[1:] for row in findings.rows}
+    one = open_study["study"]["targets"][0]["observable"]
+    for target, test in zip(several.study.targets, several.verification.tests, strict=True):
+        label = observable_label(target.observable)
+        two, other = cells[f"{label}: verification"]
+        assert two.startswith(observed(target.observable, test.simulated.mean))
+        assert (other == MISSING) == (target.observable != one), target.observable
+        assert cells[f"{label}: verdict"][0] == test.verdict
+
+
+def test_an_automatic_check_limits_the_error_of_every_target():
+    result = reported_studies.result_of_case("two targets")
+    for test, percent in zip(result["verification"]["tests"], (1.0, 7.0), strict=True):
+        test["relative_error_percent"] = percent
+    several = typed(result)
+    assert [bool(one.fault(5.0)) for one in errors(several)] == [False, True]
+    cases = ElementTree.fromstring(junit(several, (), 5.0)).findall("testcase")
+    assert [case.find("failure") is not None for case in cases] == [False, True]
+    label = observable_label(several.study.targets[1].observable)
+    assert errors(several)[1].fault(5.0) == f"{label}: relative error 7.00 % is above the limit of 5 %"
 
 
 def test_the_progress_of_a_study_calls_the_point_chosen_by_rule():
