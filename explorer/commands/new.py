@@ -52,7 +52,9 @@ def new(
         None, help="New measurement: of the condition; proposed if not given."
     ),
     photo: list[str] = typer.Option(
-        [], metavar="FILE", help="New measurement: photograph of the next pour's pile, or a shipped one's name."
+        [],
+        metavar="FILE",
+        help="New measurement: photograph of the next pour's pile (or a shipped one's name), or of a drum's face.",
     ),
     scale: float | None = typer.Option(None, metavar="MM_PER_PX", help="New measurement: pixel of the photographs."),
     angles: str | None = typer.Option(

@@ -266,14 +266,14 @@ def _kept_names(condition: str, files: Sequence[Path]) -> list[str]:
 
 
 def _write_data(folder: Path, condition: str, found: Readings) -> list[Path]:
-    """The table of ``condition``, its photographs and scans, in ``folder``."""
+    """The table of ``condition``, its pictures and scans, in ``folder``."""
     head = [f"# {' '.join(line.split())}" for line in found.sources]
     rows = [
         f"{row.replicate},{row.observable},{'' if row.x is None else repr(row.x)},{row.value!r}" for row in found.rows
     ]
     written = [folder / f"{condition}.csv"]
     write_whole(written[0], "\n".join([*head, ",".join(COLUMNS), *rows]) + "\n")
-    for kept, files in (("images", found.photographs), ("scans", found.scans)):
+    for kept, files in (("images", found.photographs or found.faces), ("scans", found.scans)):
         for file, name in zip(files, _kept_names(condition, files), strict=True):
             (folder / kept).mkdir(exist_ok=True)
             written.append(Path(shutil.copyfile(file, folder / kept / name)))

@@ -1,6 +1,7 @@
 """What a laboratory brings of one condition → rows of its table, and files that the reader of data sets takes itself.
 
-    photographs       angle_of_repose_deg@0, read anew from the pictures whenever the folder is; with a scale the height
+    photographs       angle_of_repose_deg@0, read anew from the pictures whenever the folder is; with a scale height_m;
+                      of the face of a drum that turns dynamic_angle_deg and surface_profile_m, read once
     angles            angle_of_repose_deg; in a drum dynamic_angle_deg, below a draw-down box angle_of_repose_deg@0
     a balance         discharge_time_s; with the time at which the flow was let go also t10, t50, t90 and the curve
     scans             height_profile_m in rings of the solver's width, and the surfaces themselves
@@ -12,10 +13,10 @@ The k-th photograph, angle, balance file, scan and row of a sheet are of pour k.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -30,9 +31,10 @@ from explorer.units import fixed
 from solver import Scene, pour_rig, poured_mass, without_holes
 from solver.assets import asset_path
 from solver.observables import observable_names
+from solver.observables.free_surface import CHORD
 from solver.observables.pile import PROFILE_RING
 from solver.observables.surface import radial_profile
-from solver.photograph import Refusal, open_picture, read_photograph
+from solver.photograph import Picture, Refusal, open_picture, read_drum, read_photograph
 from solver.rigs.rotating_drum import RotatingDrum
 
 Array = npt.NDArray[np.float64]
@@ -42,6 +44,9 @@ ANGLES = ("dynamic_angle_deg", "angle_of_repose_deg", "angle_of_repose_deg@0")
 """What an angle without a name is, the first one that the rig gives."""
 VIEW, DYNAMIC, FLOWED = "angle_of_repose_deg@0", "dynamic_angle_deg", "discharge_time_s"
 SHARES = {"discharge_t10_s": 0.1, "discharge_t50_s": 0.5, "discharge_t90_s": 0.9}
+SURFACE = "surface_profile_m"
+SURFACE_PLACES = 13
+"""Places of a drum's free surface."""
 PLACES = 21
 """Times of a discharged mass's curve."""
 SAME = 0.02
@@ -84,6 +89,9 @@ class Readings:
 
     rows: list[Row] = field(default_factory=list)
     photographs: tuple[Path, ...] = ()
+    """Of piles: they are read again with the folder."""
+    faces: tuple[Path, ...] = ()
+    """Of a drum's face."""
     scans: tuple[Path, ...] = ()
     sources: list[str] = field(default_factory=list)
     """A line on every source, for the head of the table."""
@@ -99,11 +107,15 @@ def read_brought(brought: Brought, scene: Scene) -> Readings:
 
     Raises CommandError, MeasurementError or LaboratoryError in one line naming the file, its key and what is allowed.
     """
-    found = Readings(photographs=brought.photographs, scans=brought.scans)
     given = observable_names(scene)
+    drum = scene.rig if isinstance(scene.rig, RotatingDrum) else None
+    piles, faces = ((), brought.photographs) if drum else (brought.photographs, ())
+    found = Readings(photographs=piles, faces=faces, scans=brought.scans)
     if brought.pixel is not None and not brought.photographs:
         raise CommandError("--scale: belongs to --photo")
-    if brought.photographs:
+    if brought.photographs and drum:
+        _faces(brought, drum.diameter, found)
+    elif brought.photographs:
         _check("--photo", any(name in given for name in ANGLES[1:]), scene)
         _photographs(brought, found)
     if brought.angles is not None:
@@ -142,21 +154,55 @@ def _mean_and_sd(values: Sequence[float]) -> str:
 
 def _photographs(brought: Brought, found: Readings) -> None:
     """Every picture has to show a pile: one that shows none would be a pour without a number."""
-    seen: dict[bytes, Path] = {}
-    angles, heights = [], []
-    for file in brought.photographs:
-        if (twin := seen.setdefault(file.read_bytes(), file)) is not file:
-            raise CommandError(f"--photo {file}: is the same picture as {twin}; take one of another pour")
-        read = read_photograph(open_picture(file), brought.pixel)
-        if isinstance(read, Refusal):
-            raise CommandError(f"--photo {file}: no angle: {read.reason}: {read.detail}")
-        angles.append(read.angles.mean.value_deg)
-        heights.append(read.height)
+    piles = _each(brought.photographs, lambda picture: read_photograph(picture, brought.pixel))
+    angles, heights = [one.angles.mean.value_deg for one in piles], [one.height for one in piles]
     found.add(VIEW, angles)
     if brought.pixel is not None:
         found.add(HEIGHT, heights)
     found.sources.append(f"{VIEW}: read off images/, anew whenever this folder is")
     found.told.append(f"{len(angles)} photographs, each of another pour: mean {_mean_and_sd(angles)}")
+
+
+def _faces(brought: Brought, diameter: float, found: Readings) -> None:
+    """Every picture has to show the whole face of the drum, whose ``diameter`` [m] is its scale."""
+    if brought.pixel is not None:
+        raise CommandError("--scale: of pictures of a drum its diameter is the scale; state --set rig.diameter")
+    drums = _each(brought.photographs, read_drum)
+    found.add(DYNAMIC, [one.angle_deg for one in drums])
+    radius = 0.5 * diameter
+    for k, one in enumerate(drums, start=1):
+        places = np.linspace(-CHORD, CHORD, SURFACE_PLACES + 2)[1:-1]
+        known = np.isfinite(one.height)
+        heights = np.interp(places, one.x[known], one.height[known], left=np.nan, right=np.nan)
+        found.rows.extend(
+            Row(k, SURFACE, float(radius * z), round(float(radius * x), 6))
+            for x, z in zip(places, heights, strict=True)
+            if np.isfinite(z)
+        )
+    found.sources.append(f"{DYNAMIC}, {SURFACE}: read off images/ once, by a camera that is taken for level")
+    angles, errors = [one.angle_deg for one in drums], [one.error_deg for one in drums]
+    found.told.append(
+        f"{len(drums)} pictures of the drum, each of another run: mean {_mean_and_sd(angles)}, read to ± "
+        f"{fixed(max(errors))}° at worst; filled to {min(one.filled for one in drums):.0%} … "
+        f"{max(one.filled for one in drums):.0%} of its face; a camera turned by 1° turns every angle by 1°"
+    )
+
+
+Reading = TypeVar("Reading")
+
+
+def _each(files: Sequence[Path], read: Callable[[Picture], Reading | Refusal]) -> list[Reading]:
+    """What ``read`` makes of each picture, which has to be of a pour of its own."""
+    seen: dict[bytes, Path] = {}
+    found = []
+    for file in files:
+        if (twin := seen.setdefault(file.read_bytes(), file)) is not file:
+            raise CommandError(f"--photo {file}: is the same picture as {twin}; take one of another pour")
+        one = read(open_picture(file))
+        if isinstance(one, Refusal):
+            raise CommandError(f"--photo {file}: no angle: {one.reason}: {one.detail}")
+        found.append(one)
+    return found
 
 
 def _angles(text: str) -> list[float]:

@@ -5,6 +5,7 @@ sets and the command line read pictures by the same function. NumPy, SciPy and P
 """
 
 from solver.photograph.checkerboard import Board, board_of
+from solver.photograph.drum import PhotographedDrum, read_drum
 from solver.photograph.picture import NotAPile, PhotographError, Picture, Reason, Refusal, open_picture
 from solver.photograph.read import PhotographedPile, read_photograph
 from solver.photograph.reference_bar import reference_pixels
@@ -13,12 +14,14 @@ __all__ = [
     "Board",
     "NotAPile",
     "PhotographError",
+    "PhotographedDrum",
     "PhotographedPile",
     "Picture",
     "Reason",
     "Refusal",
     "board_of",
     "open_picture",
+    "read_drum",
     "read_photograph",
     "reference_pixels",
 ]

@@ -77,6 +77,8 @@ class Reason(StrEnum):
     SUPPORT = "a body under the pile"
     DRAWN = "a drawing"
     NO_SCALE = "no reference length"
+    NO_DRUM = "no drum"
+    NO_SURFACE = "no free surface"
 
 
 @dataclass(frozen=True)

@@ -37,11 +37,11 @@ from explorer.design.factors_file import read_factors
 from explorer.scene.file import load_scene
 from explorer.shape import mesh_solid
 from solver.assets import asset_path
-from solver.photograph import open_picture, read_photograph
+from solver.photograph import open_picture, read_drum, read_photograph
 from solver.pours.raw_pour import unpacked
 from tests.doe.test_store import RUN
 from tests.faults.command_lines import command_fault, command_line
-from tests.faults.seeds import meshes, pictures, recordings
+from tests.faults.seeds import drum_faces, meshes, pictures, recordings
 
 ROOT = Path(__file__).parents[2]
 ASSETS = ROOT / "assets"
@@ -120,6 +120,7 @@ PARSERS = {
     "mesh": Parser(_files("assets/meshes/*.stl"), lambda p: mesh_solid(p, "mm", "--unit")),
     "raw pour": Parser(_files("tests/doe/raw_pours/*.npz"), lambda p: unpacked(p.read_bytes())),
     "picture": Parser((), lambda p: read_photograph(open_picture(p)), pictures),
+    "drum's face": Parser((), lambda p: read_drum(open_picture(p)), drum_faces),
     "mesh of every format": Parser((), lambda p: mesh_solid(p, "mm", "--unit"), meshes),
     "recording": Parser((), _recording, recordings),
     "store": Parser((_a_store(),), _stored),

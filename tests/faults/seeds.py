@@ -11,6 +11,7 @@ import trimesh
 from PIL import Image
 
 from tests.explorer.logs.test_pour_log import poses
+from tests.solver.photograph.drum_faces import Look, drawn, plane
 
 _place = tempfile.TemporaryDirectory()
 SIDES = (320, 240)
@@ -55,6 +56,17 @@ def pictures() -> tuple[Path, ...]:
     )
     for name, image, options in kinds:
         image.save(folder / name, **options)
+    return tuple(sorted(folder.iterdir()))
+
+
+@cache
+def drum_faces() -> tuple[Path, ...]:
+    """The face of a drum that turns, small."""
+    folder = _folder("drum_faces")
+    face = drawn(plane(30.0), Look(width=240, height=200, radius=80.0, at=(120.0, 100.0), grains=8.0))
+    grey = Image.fromarray(face.grey.astype(np.uint8))
+    for name in ("face.png", "face.jpg", "face.bmp"):
+        grey.save(folder / name)
     return tuple(sorted(folder.iterdir()))
 
 

@@ -24,7 +24,8 @@ from explorer.viewer.panel import LABORATORY, PageContext, Panel
 from explorer.viewer.view import small_html
 
 WAITING = (
-    "Photographs, angles, balance curves or scans of pours of one set-up, the k-th of each of pour k. Save them, and "
+    "Photographs (of piles, or of the face of a turning drum), angles, balance curves or scans of pours of one set-up, "
+    "the k-th of each of pour k. Save them, and "
     "the data set is in the list of Diagnose; then change the set-up's name to add another."
 )
 UNITS: tuple[ScanUnit, ...] = ("m", "cm", "mm", "um")
@@ -66,7 +67,12 @@ class MeasuredDataPanel(Panel):
         self._kept = gui.add_html(small_html(NOTHING))
         none = gui.add_button("Take the files off", hint="None of those that were added is used.")
         self._scale = gui.add_number(
-            "Scale [mm per pixel]", 0.0, min=0.0, max=10.0, step=0.001, hint="Of the photographs; 0: angles alone."
+            "Scale [mm per pixel]",
+            0.0,
+            min=0.0,
+            max=10.0,
+            step=0.001,
+            hint="Of piles; 0: angles alone.",
         )
         self._unit = gui.add_dropdown(
             "Unit of scans", UNITS, initial_value="mm", hint="Of .ply, .stl, .xyz, .txt, .csv."

@@ -5,6 +5,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from doe.diagnose.budget import Budget
 from doe.diagnose.diagnosis import run_diagnosis
@@ -16,6 +17,7 @@ from tests.doe.measurement.folders import MATERIAL
 from tests.explorer.command_line import explorer, refused
 from tests.explorer.measured.test_balance import BEGINS, LAG, LASTS, MASS, RATE, steady
 from tests.explorer.measured.test_balance import write as write_balance
+from tests.solver.photograph import drum_faces
 from tests.solver.photograph.rendered import Look, photograph, save, solid_cover
 
 ANGLES = (24.1, 25.0, 26.2, 23.9)
@@ -198,8 +200,29 @@ def test_a_drum_s_sheet_is_read_as_the_laboratory_does(tmp_path):
     assert values(folder, "A", "dynamic_angle_deg") == pytest.approx(np.degrees(angle.values), rel=1e-12)
     drum[-3] = "rig.speed_rpm=20"
     assert "a Froude number of" in refused(explorer("new", "measurement", tmp_path / "b", *drum))
-    assert "--photo: rotating_drum gives dynamic_angle_deg" in refused(
-        explorer("new", "measurement", tmp_path / "b", *drum[:2], "--set", rig[0], "--photo", "cone_25_30")
+
+
+def test_pictures_of_a_drum_s_face_give_its_angle_and_surface(tmp_path):
+    """Three runs of drawn beds; the diameter is the scale, and turned the other way the surface is the same."""
+    folder, drum = tmp_path / "data", ["--material", "sunflower_extract", "--set", "rig.name=rotating_drum"]
+    drum += ["--set", "rig.diameter=200mm"]
+    angles, photos = (28.0, 30.0, -31.0), []
+    for k, angle in enumerate(angles):
+        photos.append(tmp_path / f"face_{k}.png")
+        grey = drum_faces.drawn(drum_faces.plane(angle), drum_faces.Look(grains=10.0, seed=k)).grey
+        Image.fromarray(grey.astype(np.uint8)).save(photos[-1])
+    text = new(folder, *drum, *(word for photo in photos for word in ("--photo", photo)))
+    assert "3 pictures of the drum" in text
+    found = values(folder, "A", "dynamic_angle_deg")
+    assert found == pytest.approx(np.abs(angles), abs=0.3)
+    profile = load_measurement(folder).conditions[0].offered["surface_profile_m"]
+    line = -0.1 * 0.1 - np.tan(np.radians(found)).mean() * profile.x
+    assert profile.values.mean(axis=0) == pytest.approx(line, abs=1.5e-3)
+    assert len(list((folder / "images").iterdir())) == 3
+    bad = [*drum, "--photo", "cone_25_30"]
+    assert "no drum" in refused(explorer("new", "measurement", tmp_path / "b", *bad))
+    assert "--scale: of pictures of a drum" in refused(
+        explorer("new", "measurement", tmp_path / "b", *drum, "--photo", photos[0], "--scale", "0.2")
     )
 
 
