@@ -49,6 +49,7 @@ def export(
     from explorer.export.target import ExportOrder
     from explorer.files.run_folder import appearing
     from explorer.scene.file import named_scene, with_settings
+    from explorer.study.duration import large_pour_text
     from solver import value
 
     if to not in EXPORTS:
@@ -64,6 +65,8 @@ def export(
     if time is not None and time < float(value(scene, "numerics.max_time")):
         scene = with_settings(scene, [f"numerics.max_time={time!r}"])
     target.check(scene)
+    if target.pours and (large := large_pour_text(scene)):
+        typer.echo(large, err=True)
     with appearing(folder, "DIR") as temporary:
         told = target.write(temporary, ExportOrder(scene, seed, time, every))
     typer.echo(f"{folder}: {told}")

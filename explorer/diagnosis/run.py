@@ -53,6 +53,7 @@ from explorer.files.output_file import check_new_file, write_whole
 from explorer.files.run_result import made_today, versions
 from explorer.report.diagnosis import diagnosis_report
 from explorer.report.folder import write_report
+from explorer.study.duration import large_pour_text
 from solver import EFFECTS, Executor, executor
 
 RULE = Rule(
@@ -133,6 +134,9 @@ def _run(
         f"{order.folder}: {len(measurement.fit)} fitted and {len(measurement.holdout)} held-out conditions; store "
         f"{path}"
     )
+    for condition in measurement.conditions:
+        if large := large_pour_text(condition.scene):
+            say(f"{condition.name}: {large}")
     progress = PourProgress(reporter)
     progress.compiling()
     with ExitStack() as stack:

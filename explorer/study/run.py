@@ -47,6 +47,7 @@ from explorer.photograph.target import FOLDER, PhotographedTarget, load_target
 from explorer.report import write_report
 from explorer.report.photograph import PhotographResult
 from explorer.report.set_up import set_up_of
+from explorer.study.duration import duration_text
 from explorer.study.process import PARTIAL, RESULT
 from solver import Executor, executor, pour_rig, run_queue, unpacked
 from solver.arch import chosen
@@ -134,6 +135,8 @@ def _run(
         photographed.copied(order.out / FOLDER)
         say(f"target: {photographed.line}")
     say(f"{study.name}, profile {profile.name}: {sum(planned.values())} runs of {1e3 * profile.mass:g} g; store {path}")
+    if not order.scheduler:  # how many cores its workers have, nobody knows beforehand
+        say(duration_text(study, profile, path, order.threads))
     progress = RunProgress(reporter, planned)
     progress.compiling()
     partial = PartialResult(order.out, StudyDescription.of(study, profile, order.tries))

@@ -7,11 +7,13 @@ import pytest
 from doe.stages import planned_runs
 from doe.store import Store, StoredRun
 from doe.studies.study import load_study, with_profile
+from explorer.export import EXPORTS
 from explorer.study.duration import PACE, SETTLING, SPHERE_GB, WORKER_GB, duration_text, large_pour_text
 from solver import PHYSICS, ParameterError, body_counts, value, with_rig, with_values
 from solver.pours.run import MOST_BODIES, sizes_for
 from solver.scenes.time_step import time_step
 from solver.shapes.solid import Solid
+from tests.explorer.command_line import explorer
 
 STUDY = load_study("sunflower_extract")
 QUICK, STANDARD = STUDY.profiles["quick"], STUDY.profiles["standard"]
@@ -106,6 +108,14 @@ def test_a_large_pour_is_told_beforehand_and_a_small_one_is_not():
         f"{sum(body_counts(large))} bodies of {spheres} spheres: roughly {seconds / 3600:.1f} h a pour"
     )
     assert told.endswith(f"{WORKER_GB + spheres * SPHERE_GB:.1f} GB of memory")
+
+
+def test_an_export_tells_a_large_pour_before_it_pours(tmp_path, monkeypatch):
+    """The deck's pour is replaced by nothing; a table of the material pours nothing, and tells nothing."""
+    monkeypatch.setattr(type(EXPORTS["liggghts"]), "write", lambda *_: "a deck")
+    large = ("funnel", "--set", "rig.mass=5kg")
+    assert "bodies of" in explorer("export", *large, tmp_path / "deck", "--to", "liggghts").stderr
+    assert "bodies of" not in explorer("export", *large, tmp_path / "table", "--to", "edem").stderr
 
 
 def test_a_pour_of_too_many_bodies_is_refused_before_room_is_made_for_it():

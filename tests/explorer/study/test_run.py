@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
@@ -84,6 +85,7 @@ def test_a_study_leaves_result_and_reports(tmp_path):
     assert events == lines_of((tmp_path / "out" / "progress.jsonl").read_text())
     assert (events[-1]["outcome"], events[-1]["result"]) == ("finished", str(tmp_path / "out" / "result.json"))
     assert "report.html" in done.stderr
+    assert re.search(r"\d+ runs of coarse shapes, roughly \d+ (s|min) on \d+ core.* GB of memory", done.stderr)
     assert {line["run_id"] for line in lines_of((tmp_path / "out" / LOG).read_text())} == {events[0]["run_id"]}
     assert [event["stage"] for event in events if event["line"]] == list(OWN_STAGES)
     assert events[-1]["done"] == events[-1]["planned"] == result["runs"]["total"]
