@@ -79,11 +79,7 @@ def precision(
     """
     _require_noise(sigma, effect)
     included = included_terms(names, terms)
-    model = second_order_terms(coded)[:, included]
-    if block is not None and block.size:
-        model = np.column_stack([model, block_columns(block, int(block.max()) + 1)])
-    if np.linalg.matrix_rank(model) < model.shape[1]:
-        raise StatisticsError(f"the {len(coded)} runs cannot separate the {model.shape[1]} terms of the model")
+    model = _with_blocks(second_order_terms(coded)[:, included], block)
     errors = sigma * np.sqrt(np.diag(np.linalg.inv(model.T @ model)))
     df = model.shape[0] - model.shape[1]
     kinds = [_kind(term) for term, is_in in zip(term_names(names), included, strict=True) if is_in]
@@ -126,12 +122,8 @@ def precision_of_names(
     """
     _require_noise(sigma, effect)
     columns = columns_of(levels, terms)
-    model = columns.matrix(coded)
+    model = _with_blocks(columns.matrix(coded), block)
     own = [term_of(name) for name in columns.names]
-    if block is not None and block.size:
-        model = np.column_stack([model, block_columns(block, int(block.max()) + 1)])
-    if np.linalg.matrix_rank(model) < model.shape[1]:
-        raise StatisticsError(f"the {len(coded)} runs cannot separate the {model.shape[1]} columns of the model")
     df = model.shape[0] - model.shape[1]
     worst: dict[str, TermPrecision] = {}
     for term in terms:
@@ -157,6 +149,16 @@ def precision_of_names(
         poorer = max(before, found, key=lambda one: (np.nan_to_num(one.smallest), one.standard_error))
         worst[found.kind] = replace(poorer, terms=before.terms + (found.kind in worst))
     return tuple(worst[kind] for kind in ("factor", "name", "interaction", "square") if kind in worst)
+
+
+def _with_blocks(terms: FloatArray, block: npt.NDArray[np.int64] | None) -> FloatArray:
+    """The model of `terms`, shape (runs, terms), and blocks; StatisticsError where the runs cannot separate it."""
+    model = terms
+    if block is not None and block.size:
+        model = np.column_stack([model, block_columns(block, int(block.max()) + 1)])
+    if np.linalg.matrix_rank(model) < model.shape[1]:
+        raise StatisticsError(f"the {len(model)} runs cannot separate the {model.shape[1]} columns of the model")
+    return model
 
 
 def _changes(coded: FloatArray, levels: Sequence[int], term: str) -> FloatArray:
