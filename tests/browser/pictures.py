@@ -294,6 +294,15 @@ def laboratory_pictures(view: Camera) -> None:
         view.take(f"laboratory_{name}")
         view.press(section)
         time.sleep(1.0)
+    view.unfold("Measured data → Diagnose")
+    angles = view.page.get_by_label("Angles [°]").filter(visible=True).first
+    angles.fill("24.1, 25.0, 26.2, 23.9")
+    angles.press("Enter")
+    time.sleep(1.0)
+    view.press("Save the data")
+    view.top("explorer new measurement")
+    view.take("laboratory_measured_data")
+    view.press("Measured data → Diagnose")
 
 
 def finished_pictures(view: Camera) -> None:

@@ -8,9 +8,10 @@ from doe.stages import planned_runs
 from doe.store import Store, StoredRun
 from doe.studies.study import load_study, with_profile
 from explorer.export import EXPORTS
-from explorer.study.duration import PACE, SETTLING, SPHERE_GB, WORKER_GB, duration_text, large_pour_text
+from explorer.study.duration import PACE, PACES, SETTLING, SPHERE_GB, WORKER_GB, duration_text, large_pour_text
 from solver import PHYSICS, ParameterError, body_counts, value, with_rig, with_values
 from solver.pours.run import MOST_BODIES, sizes_for
+from solver.rigs.funnel import Funnel
 from solver.scenes.time_step import time_step
 from solver.shapes.solid import Solid
 from tests.explorer.command_line import explorer
@@ -51,7 +52,7 @@ def test_before_the_first_pours_it_is_reckoned_from_spheres_and_steps(store, tmp
     scene = with_profile(STUDY, "standard")[0].scene
     spheres = sum(n * len(body.clump.radii) for n, body in zip(body_counts(scene), scene.bodies, strict=True))
     # 30 g at 20 g/s, then it settles.
-    seconds = spheres * (1.5 + SETTLING) / time_step(scene) / PACE
+    seconds = spheres * (1.5 + SETTLING) / time_step(scene) / PACES[Funnel]
     minutes = sum(planned_runs(STUDY, STANDARD).values()) * seconds / 2 / 60.0
     for file in (store, tmp_path / "none.sqlite"):
         said = duration_text(STUDY, STANDARD, file, 2)
@@ -102,7 +103,7 @@ def test_a_large_pour_is_told_beforehand_and_a_small_one_is_not():
     assert large_pour_text(STUDY.scene) == ""
     large = with_values(STUDY.scene, {"rig.mass": 5.0})
     spheres = sum(n * len(body.clump.radii) for n, body in zip(body_counts(large), large.bodies, strict=True))
-    seconds = spheres * (5.0 / value(large, "insertion.rate") + SETTLING) / time_step(large) / PACE
+    seconds = spheres * (5.0 / value(large, "insertion.rate") + SETTLING) / time_step(large) / PACES[Funnel]
     told = large_pour_text(large)
     assert told.startswith(
         f"{sum(body_counts(large))} bodies of {spheres} spheres: roughly {seconds / 3600:.1f} h a pour"
