@@ -114,7 +114,7 @@ def read_brought(brought: Brought, scene: Scene) -> Readings:
     if brought.pixel is not None and not brought.photographs:
         raise CommandError("--scale: belongs to --photo")
     if brought.photographs and drum:
-        _faces(brought, drum.diameter, found)
+        _faces(brought, drum, found)
     elif brought.photographs:
         _check("--photo", any(name in given for name in ANGLES[1:]), scene)
         _photographs(brought, found)
@@ -163,13 +163,13 @@ def _photographs(brought: Brought, found: Readings) -> None:
     found.told.append(f"{len(angles)} photographs, each of another pour: mean {_mean_and_sd(angles)}")
 
 
-def _faces(brought: Brought, diameter: float, found: Readings) -> None:
-    """Every picture has to show the whole face of the drum, whose ``diameter`` [m] is its scale."""
+def _faces(brought: Brought, rig: RotatingDrum, found: Readings) -> None:
+    """Every picture has to show the whole face of the drum, whose diameter is its scale."""
     if brought.pixel is not None:
         raise CommandError("--scale: of pictures of a drum its diameter is the scale; state --set rig.diameter")
     drums = _each(brought.photographs, read_drum)
     found.add(DYNAMIC, [one.angle_deg for one in drums])
-    radius = 0.5 * diameter
+    radius = rig.radius
     for k, one in enumerate(drums, start=1):
         places = np.linspace(-CHORD, CHORD, SURFACE_PLACES + 2)[1:-1]
         known = np.isfinite(one.height)
@@ -184,7 +184,7 @@ def _faces(brought: Brought, diameter: float, found: Readings) -> None:
     found.told.append(
         f"{len(drums)} pictures of the drum, each of another run: mean {_mean_and_sd(angles)}, read to ± "
         f"{fixed(max(errors))}° at worst; filled to {min(one.filled for one in drums):.0%} … "
-        f"{max(one.filled for one in drums):.0%} of its face; a camera turned by 1° turns every angle by 1°"
+        f"{max(one.filled for one in drums):.0%} of its face, the rig at rest to {rig.fill_level:.0%}; a camera turned by 1° turns every angle by 1°"
     )
 
 
