@@ -183,8 +183,9 @@ def _faces(brought: Brought, rig: RotatingDrum, found: Readings) -> None:
     angles, errors = [one.angle_deg for one in drums], [one.error_deg for one in drums]
     found.told.append(
         f"{len(drums)} pictures of the drum, each of another run: mean {_mean_and_sd(angles)}, read to ± "
-        f"{fixed(max(errors))}° at worst; filled to {min(one.filled for one in drums):.0%} … "
-        f"{max(one.filled for one in drums):.0%} of its face, the rig at rest to {rig.fill_level:.0%}; a camera turned by 1° turns every angle by 1°"
+        f"{fixed(max(errors))}° at worst; the bed covers {min(one.filled for one in drums):.0%} … "
+        f"{max(one.filled for one in drums):.0%} of the face, that of the rig at rest {rig.fill_level:.0%}; a camera "
+        "turned by 1° turns every angle by 1°"
     )
 
 
