@@ -168,6 +168,21 @@ def test_it_pours_audits_and_serves(environment, home):
         assert b"<html" in page.read()
 
 
+def test_the_long_commands_come_to_their_ends(environment):
+    """A study, a diagnosis of two effects, and a validation that is stopped for time in its first pours."""
+    program = installed(environment, HOMES[0])
+    program.ran("calibrate", "--headless", "--profile", "quick", "--out", "Studie")
+    study = json.loads((program.folder / "Studie/result.json").read_text(encoding="utf-8"))
+    assert study["verification"]["tests"][0]["verdict"]
+    asked = ("--effects", "rolling_resistance,air_drag", "--budget", 40, "--out", "Diagnose")
+    program.ran("diagnose", "trefoil_2", *asked)
+    answer = json.loads((program.folder / "Diagnose/diagnosis.json").read_text(encoding="utf-8"))
+    assert answer["verdict"] == "effect:rolling_resistance"
+    for folder in ("Studie", "Diagnose"):
+        assert (program.folder / folder / "report.html").stat().st_size > 10_000
+    assert "all pours are kept" in program.ran("validate-diagnosis", "--n", 1, "--minutes", 0.5)
+
+
 def test_without_a_home_a_study_asks_for_a_store_in_one_line(environment):
     program = installed(environment, "none")
     said = program.ran("calibrate", "--headless", "--profile", "quick", "--out", "Studie", code=2)

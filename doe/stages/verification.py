@@ -31,8 +31,12 @@ class VerificationResult(Record):
     @property
     def line(self) -> str:
         """One line of what the verification found."""
-        test = self.tests[0]
-        line = f"{test.statement} Relative error {test.relative_error_percent:.2f} %."
+        several = len(self.targets) > 1
+        line = " ".join(
+            f"{f'{target.observable}: ' if several else ''}{test.statement} Relative error "
+            f"{test.relative_error_percent:.2f} %."
+            for target, test in zip(self.targets, self.tests, strict=True)
+        )
         for target, found in zip(self.targets, self.tests, strict=True):
             if target.before_mean is not None:
                 name = target.observable

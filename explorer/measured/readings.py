@@ -118,6 +118,8 @@ def read_brought(brought: Brought, scene: Scene) -> Readings:
     elif brought.photographs:
         _check("--photo", any(name in given for name in ANGLES[1:]), scene)
         _photographs(brought, found)
+    if drum and sum(given is not None for given in (brought.photographs or None, brought.angles, brought.drum)) > 1:
+        raise CommandError(f"--photo, --angles, --drum: each gives {DYNAMIC}; allowed: one of them for a set-up")
     if brought.angles is not None:
         name = next((name for name in ANGLES if name in given), "")
         _check("--angles", bool(name), scene)
@@ -180,12 +182,14 @@ def _faces(brought: Brought, rig: RotatingDrum, found: Readings) -> None:
             if np.isfinite(z)
         )
     found.sources.append(f"{DYNAMIC}, {SURFACE}: read off images/ once, by a camera that is taken for level")
-    angles, errors = [one.angle_deg for one in drums], [one.error_deg for one in drums]
+    angles, filled = [one.angle_deg for one in drums], [one.filled for one in drums]
+    radii = [one.circle.radius for one in drums]
     found.told.append(
         f"{len(drums)} pictures of the drum, each of another run: mean {_mean_and_sd(angles)}, read to ± "
-        f"{fixed(max(errors))}° at worst; the bed covers {min(one.filled for one in drums):.0%} … "
-        f"{max(one.filled for one in drums):.0%} of the face, that of the rig at rest {rig.fill_level:.0%}; a camera "
-        "turned by 1° turns every angle by 1°"
+        f"{fixed(max(one.error_deg for one in drums))}° at worst; the drum's radius is {min(radii):.0f} … "
+        f"{max(radii):.0f} px, the bed covers {min(filled):.0%} … {max(filled):.0%} of its face, that of the rig at "
+        f"rest {rig.fill_level:.0%}; a camera turned by 1° turns every angle by 1°, and one moment scatters more than "
+        "the mean over turns that a simulated drum gives"
     )
 
 

@@ -64,7 +64,7 @@ def _of_target(result: StudyResult, observable: str) -> dict[str, str]:
     else:
         ends = " … ".join(observed(observable, end) for end in (single.predicted_low, single.predicted_high))
         cells["predicted at the optimum"] = f"{observed(observable, single.predicted)} ({ends})"
-        cells["better than noise"] = "yes" if single.better_than_noise else "no"
+    cells["better than noise"] = "yes" if anova.better_than_noise else "no"
     cells["verification"] = (
         f"{observed(observable, sample.mean)} ± {observed(observable, sample.sd)} (sd), {sample.n} pours"
     )

@@ -284,22 +284,21 @@ def _read(screening: str, targets: Sequence[Target]) -> str:
 
 def _tests(result: StudyResult) -> str:
     analysis, stage = result.screening.analysis, result.verification
-    pours = enumeration([str(n) for n in sorted({test.simulated.n for test in stage.tests})])
-    found = [_tested(target, test) for target, test in zip(stage.targets, stage.tests, strict=True)]
-    if len(found) > 1:
-        found = [
-            f"for the {observable_label(target.observable)} {one}"
-            for target, one in zip(stage.targets, found, strict=True)
-        ]
-    return (
-        f"Effects were tested against the {analysis.error_source}, corrected by Holm’s "
-        f"procedure{citations(('holm1979',))}. {pours} fresh pours at the chosen setting gave {'; '.join(found)}."
+    several = len(stage.targets) > 1
+    return " ".join(
+        (
+            f"Effects were tested against the {analysis.error_source}, corrected by Holm’s "
+            f"procedure{citations(('holm1979',))}.",
+            *(_tested(target, test, several) for target, test in zip(stage.targets, stage.tests, strict=True)),
+        )
     )
 
 
-def _tested(target: Target, test: Verification) -> str:
+def _tested(target: Target, test: Verification, named: bool) -> str:
     name = target.observable
+    what = f" for the {observable_label(name)}" if named else ""
     text = (
+        f"{test.simulated.n} fresh pours at the chosen setting gave{what} "
         f"{observed(name, test.simulated.mean)} ± {observed(name, test.simulated.sd)} (SD) against "
         f"{observed(name, target.mean)} measured"
     )
@@ -312,4 +311,4 @@ def _tested(target: Target, test: Verification) -> str:
             f"; equivalence within ± {observed(name, target.margin)} was tested by two one-sided tests"
             f"{citations(('schuirmann1987',))}: {test.verdict}"
         )
-    return text
+    return f"{text}."

@@ -58,7 +58,7 @@ def duration_text(study: Study, profile: Profile, store: Path, workers: int | No
     counts = runs_of_scenes(study, profile)
     runs = sum(counts.values())
     least = "" if profile.resolution_deg is None else "at least "  # the pilot may ask for more
-    memory = f"{workers * WORKER_GB:.1f} GB of memory"
+    memory = f"{workers * _worker_gb(study, profile):.1f} GB of memory"
     pours = f"{least}{runs} runs of {profile.spheres} shapes"
     took = {name: stored_times(study, profile, store, name) for name in counts}
     known = {name: len(times) >= FEWEST for name, times in took.items()}
@@ -74,8 +74,7 @@ def duration_text(study: Study, profile: Profile, store: Path, workers: int | No
         told, about = f"{mean:.1f} s a pour, mean of {sum(map(len, took.values()))} stored ones", "about"
     if not math.isfinite(mean):
         return f"{pours}, {memory}; how long is told after the first pours: none of its kind is stored yet."
-    minutes = runs * mean / workers / 60.0
-    time = f"{minutes:.0f} min" if minutes >= 1.5 else f"{60.0 * minutes:.0f} s"
+    time = _time_text(runs * mean / workers)
     cores = f"{workers} core{'s' if workers > 1 else ''}"
     return f"{pours}, {least}{about} {time} on {cores} ({told}), {memory}."
 
@@ -107,7 +106,9 @@ def pour_time(scene: Scene) -> float:
     else:
         mass = sum(n * body.mass for n, body in zip(counts, scene.bodies, strict=True))
     simulated = mass / float(value(scene, "insertion.rate")) + SETTLING + (pour_rig(scene).running_time or 0.0)
-    return spheres_of(scene) * simulated / time_step(scene) / PACES.get(type(scene.rig), PACE)
+    simulated = min(simulated, float(value(scene, "numerics.max_time")))
+    pace = next((known for rig, known in PACES.items() if isinstance(scene.rig, rig)), PACE)
+    return spheres_of(scene) * simulated / time_step(scene) / pace
 
 
 def spheres_of(scene: Scene) -> int:
@@ -120,12 +121,26 @@ def large_pour_text(scene: Scene) -> str:
     seconds = pour_time(scene)
     if not seconds > LONG:
         return ""
-    time = f"{seconds / 3600.0:.1f} h" if seconds >= 5400.0 else f"{seconds / 60.0:.0f} min"
     spheres = spheres_of(scene)
     return (
-        f"{sum(body_counts(scene))} bodies of {spheres} spheres: roughly {time} a pour on one core (from spheres and "
-        f"steps, to a factor of five), {WORKER_GB + spheres * SPHERE_GB:.1f} GB of memory"
+        f"{sum(body_counts(scene))} bodies of {spheres} spheres: roughly {_time_text(seconds)} a pour on one core "
+        f"(from spheres and steps, to a factor of five), {WORKER_GB + spheres * SPHERE_GB:.1f} GB of memory"
     )
+
+
+def _time_text(seconds: float) -> str:
+    if seconds >= 5400.0:
+        return f"{seconds / 3600.0:.1f} h"
+    return f"{seconds / 60.0:.0f} min" if seconds >= 90.0 else f"{seconds:.0f} s"
+
+
+def _worker_gb(study: Study, profile: Profile) -> float:
+    """Memory of one process that pours for ``study`` [GB]."""
+    try:
+        sized = with_profile(study, profile.name)[0]
+    except ValueError:  # told where the study is started
+        return WORKER_GB
+    return WORKER_GB + SPHERE_GB * max(spheres_of(sized.scene_of(name)) for name in ("", *study.experiments))
 
 
 def stored_times(study: Study, profile: Profile, store: Path, experiment: str = "") -> list[float]:

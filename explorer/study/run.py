@@ -135,7 +135,7 @@ def _run(
         photographed.copied(order.out / FOLDER)
         say(f"target: {photographed.line}")
     say(f"{study.name}, profile {profile.name}: {sum(planned.values())} runs of {1e3 * profile.mass:g} g; store {path}")
-    if not order.scheduler:  # how many cores its workers have, nobody knows beforehand
+    if not order.scheduler:  # how many cores those workers have, nobody knows beforehand
         say(duration_text(study, profile, path, order.threads))
     progress = RunProgress(reporter, planned)
     progress.compiling()

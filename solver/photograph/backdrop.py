@@ -37,6 +37,8 @@ LEAST_SIGNAL = 4.0
 LEAST_AREA = 0.002
 """Share of the picture that a pile covers at least."""
 BINS = 256
+CONSTANT = 1e-6
+"""Range of grey levels that is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,11 +108,12 @@ def thresholds(excess: Array) -> list[float]:
 
 
 def otsu(values: Array) -> float:
-    """The threshold that parts ``values`` with the greatest variance between the parts (Otsu 1979); NaN for a constant.
+    """The threshold that parts ``values`` with the greatest variance between the parts (Otsu 1979); NaN for a constant,
+    also one that a filter has left with its rounding.
 
     Of thresholds that are equally good the middle one, so that it lies half-way across an empty stretch.
     """
-    if values.size == 0 or values.min() == values.max():
+    if values.size == 0 or float(np.ptp(values)) < CONSTANT:
         return float("nan")
     count, edges = np.histogram(values, bins=BINS)
     middle = 0.5 * (edges[:-1] + edges[1:])

@@ -3,8 +3,9 @@
     grey levels → the drum's circle → darker and lighter part of its inside → the lower one is the bed
         → its top over the middle of the drum → line over the middle half, as in `observables/free_surface.py`
 
-The camera looks along the axis and is level: the picture holds nothing that would tell how far it is not, and a camera
-that is turned by 1° turns the angle by 1°. A picture is one moment, or the time that it was exposed.
+The camera looks along the axis, or the rim is an ellipse, which is refused; and it is level, of which the picture tells
+nothing: a camera that is turned about the axis by 1° turns the angle by 1°. A picture is one moment, or the time that
+it was exposed.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from solver.observables.free_surface import CHORD, slope_angle_deg
 from solver.observables.silhouette import column_tops, largest_part
 from solver.photograph.backdrop import otsu
 from solver.photograph.clearest import reduced_grey
-from solver.photograph.edge import LEVELS, Patch, pixel_noise, silhouettes
+from solver.photograph.edge import LEVELS, Patch, edge_width, pixel_noise, silhouettes
 from solver.photograph.picture import NotAPile, Picture, Reason, Refusal
 
 Array = npt.NDArray[np.float64]
@@ -37,10 +38,27 @@ SECTORS = 72
 """Of a circle, in which an edge is looked for."""
 SEEN = 0.6
 """Share of them in which a drum has one at least."""
-INNER = 0.75
-"""Of the share of the clearest circle: of two circles that are about as clear the inner one is where the bed ends."""
+CLEAR = 0.75
+"""Share of the sectors with an edge, over that of the clearest circle, from which on another one is clear."""
+CANDIDATES = 24
 NEAR = 0.06
-"""Share of the radius about the rough circle in which its edge is looked for in the picture itself."""
+"""Share of the radius about the rough circle at which the rim is looked for in the picture itself, from which on."""
+FAINT = 0.2
+"""Of the steepest edge of a sector: a fainter one is grain."""
+SEEN_INNER = 0.5
+"""Of the sectors, in which the inner edge of a rim is seen at least."""
+EDGE = 0.004
+"""Share of the radius by which the edge of a sector lies off the rim."""
+BIG_GAP = 0.03
+"""Share by which the radii of two circles differ at least."""
+CONCENTRIC = 0.06
+"""Share of the radius by which the middles of a drum's circles may differ."""
+BOTH_TONES = 0.1
+"""Share of a ring that each tone covers at least where the bed goes on into it."""
+ASLANT = 0.008
+"""Share of the radius by which the rim may be an ellipse; an axis 7° off makes as much."""
+OUTSIDE = 0.01
+"""Share of the radius by which the circle may lie outside the picture."""
 RIM = 0.95
 """Of the radius: beyond it the wall is seen, or its shadow."""
 TEXTURE = 1.0 / 40.0
@@ -57,6 +75,13 @@ LEAST_WINDOW = 0.6
 """Share of the window's columns that the surface has to be seen over."""
 STRAIGHT = 0.12
 """Root mean square distance of the surface from its line, over the radius, beyond which it is no bed's."""
+CROSSED = 0.08
+"""Share of what lies below the topmost place of the bed's tone, column by column, that may be of the other tone: 0 of
+beds; 0.12 and more where a bar, a spoke or a reflection crosses the drum."""
+WIDEST = 0.12
+"""Of the radius, over which the grey changes from the bed to the background at most: slanting light changes slower."""
+LEAST_ANGLE, MOST_ERROR = 1.0, 2.0
+"""Angle [°] below which a drum does not turn, or what was read is no bed's surface; and greatest standard error [°]."""
 
 
 @dataclass(frozen=True)
@@ -74,9 +99,10 @@ class PhotographedDrum:
 
     name: str
     angle_deg: float
-    """Of the line through the surface over the middle half of the drum, above the horizontal of the picture."""
+    """Of the line through the surface over the middle half of the drum, to the horizontal of the picture."""
     error_deg: float
-    """Standard error: of the line by the surface's roughness, and of where between bed and background the edge is."""
+    """Standard error: of the line by the surface's roughness, of where between bed and background the edge is, and of
+    an axis that the camera does not look along."""
     carried: Literal["left", "right"]
     """The side on which the bed lies higher: to which the drum carries it up."""
     circle: Circle
@@ -100,38 +126,36 @@ def read_drum(picture: Picture) -> PhotographedDrum | Refusal:
 
 def _read(picture: Picture) -> PhotographedDrum:
     grey = picture.grey.astype(np.float64)
-    x, y, radius = _circle(grey)
+    x, y, radius, ellipse = _circle(grey)
+    _check_circle(grey, x, y, radius, ellipse)
     bed, contrast, filled = _bed(grey, x, y, radius)
     patch, half = _middle(grey, bed, x, y, radius)
     images = silhouettes(patch, pixel_noise(grey)).images
     places: Array = (np.arange(patch.grey.shape[1], dtype=np.float64) + 0.5) * patch.step / radius - half
-    surfaces = [_surface(image, patch, radius) for image in images]
-    angles = [slope_angle_deg(places, surface, WINDOW) for surface in surfaces]
-    height = surfaces[LEVELS.index(0.5)]
-    window = np.abs(places) <= WINDOW
-    known = window & np.isfinite(height)
-    if np.count_nonzero(known) < LEAST_WINDOW * np.count_nonzero(window):
-        raise NotAPile(Reason.NO_SURFACE, "the bed's surface does not reach over the middle half of the drum")
-    line = np.polyfit(places[known], height[known], 1)
-    off = height[known] - np.polyval(line, places[known])
-    if float(np.sqrt(np.mean(off**2))) > STRAIGHT:
-        raise NotAPile(Reason.NO_SURFACE, "what stands out in the drum has no even surface")
+    low, height, high = (_surface(image, patch, radius) for image in images)
+    _check_surface(places, height)
     angle = slope_angle_deg(places, height, WINDOW)
-    sign = 1.0 if angle >= 0.0 else -1.0
-    level = 0.5 * abs(angles[0] - angles[-1])
-    # A flowing bed is bent like an S by itself: what is left of a cubic is its roughness.
-    rough = height[known] - np.polyval(np.polyfit(places[known], height[known], 3), places[known])
+    if abs(angle) < LEAST_ANGLE:
+        raise NotAPile(Reason.NO_SURFACE, "the line across the drum is level: it does not turn, or that is no bed")
+    width = edge_width(patch, column_tops(images[LEVELS.index(0.5)]).astype(np.float64), contrast) * patch.step
+    if width > WIDEST * radius:
+        raise NotAPile(Reason.NO_SURFACE, "light and dark go over into each other slowly, as under slanting light")
+    level = 0.5 * abs(slope_angle_deg(places, low, WINDOW) - slope_angle_deg(places, high, WINDOW))
+    aslant = float(np.degrees(ellipse * np.sin(2.0 * np.radians(abs(angle)))))
+    error = float(np.linalg.norm([_line_error_deg(places, height), level, aslant]))
+    if error > MOST_ERROR:
+        raise NotAPile(Reason.NO_SURFACE, f"the surface is so rough that its angle is known to ± {error:.1f}° only")
     return PhotographedDrum(
         name=picture.name,
         angle_deg=abs(angle),
-        error_deg=float(np.hypot(_line_error_deg(places[known], rough, float(line[0])), level)),
-        carried="left" if sign > 0.0 else "right",
+        error_deg=error,
+        carried="left" if angle > 0.0 else "right",
         circle=Circle(
             float(picture.place(np.array(x))), float(picture.place(np.array(y))), float(radius * picture.reduced)
         ),
         filled=filled,
         x=places,
-        height=height if sign > 0.0 else height[::-1].copy(),
+        height=height if angle > 0.0 else height[::-1].copy(),
         contrast=contrast,
     )
 
@@ -139,22 +163,17 @@ def _read(picture: Picture) -> PhotographedDrum:
 # The circle
 
 
-def _circle(grey: Array) -> tuple[float, float, float]:
-    """Middle and radius [px of ``grey``] of the innermost circle that is about as clear as the clearest one.
+def _circle(grey: Array) -> tuple[float, float, float, float]:
+    """Middle and radius [px of ``grey``] of the circle that the bed ends at, and how far it is an ellipse.
 
     Every steep pixel votes for the circles through it whose middle lies along its gradient (Duda & Hart 1972, doi
-    10.1145/361237.361242, with the direction of the gradient as Kimme, Ballard & Sklansky 1975 take it).
+    10.1145/361237.361242, with the direction of the gradient as Kimme, Ballard & Sklansky 1975 take it). Of the clear
+    ones the largest is the drum, or its outer edge; of those about the same middle it is the innermost one that
+    the bed does not go on beyond.
     """
     scale = max(max(grey.shape) / CIRCLE_SIDE, 1.0)
     small = reduced_grey(grey.astype(np.float32), scale)
-    smooth = ndimage.gaussian_filter(small, 1.2)
-    gx, gy = ndimage.sobel(smooth, 1), ndimage.sobel(smooth, 0)
-    steep = np.hypot(gx, gy)
-    rows, columns = np.nonzero((steep > np.quantile(steep, 1.0 - EDGE_SHARE)) & (steep > 1.0))
-    if rows.size == 0:
-        raise NotAPile(Reason.BLANK, "nothing in the picture differs from the rest")
-    ux, uy = gx[rows, columns] / steep[rows, columns], gy[rows, columns] / steep[rows, columns]
-    edge = np.stack([columns, rows, ux, uy]).astype(np.float64)
+    edge = _steep(ndimage.gaussian_filter(small, 1.2))
     side = min(small.shape)
     found = []
     for radius in np.arange(RADII[0] * side, RADII[1] * side, 1.5):
@@ -167,14 +186,51 @@ def _circle(grey: Array) -> tuple[float, float, float]:
         votes = ndimage.gaussian_filter(votes, 1.5)
         row, column = np.unravel_index(int(votes.argmax()), votes.shape)
         found.append((float(votes.max()) / radius, float(column), float(row), float(radius)))
-    refined = [_refined(edge, *circle) for _, *circle in sorted(found, reverse=True)[:12]]
+    refined = [_refined(edge, *circle) for _, *circle in sorted(found, reverse=True)[:CANDIDATES]]
     best = max(share for share, *_ in refined)
     if best < SEEN:
         raise NotAPile(
             Reason.NO_DRUM, f"no circle: of the clearest one {best:.0%} can be seen; the whole face has to be in it"
         )
-    _, x0, y0, radius = min((one for one in refined if one[0] >= max(SEEN, INNER * best)), key=lambda one: one[3])
+    clear = sorted((r, x, y) for share, x, y, r in refined if share >= max(SEEN, CLEAR * best))
+    largest, x0, y0 = clear[-1]
+    rings = [(r, x, y) for r, x, y in clear if np.hypot(x - x0, y - y0) < CONCENTRIC * largest]
+    drum = rings[0]
+    for ring in rings[1:]:
+        if ring[0] > (1.0 + BIG_GAP) * drum[0] and _goes_on(small, drum, ring):
+            drum = ring
+    radius, x0, y0 = drum
     return _on_the_edge(grey, (x0 + 0.5) * scale - 0.5, (y0 + 0.5) * scale - 0.5, radius * scale)
+
+
+def _steep(smooth: Array) -> Array:
+    """Places and unit gradients, x, y, u, v by row, of the steepest pixels."""
+    gx, gy = ndimage.sobel(smooth, 1), ndimage.sobel(smooth, 0)
+    steep = np.hypot(gx, gy)
+    rows, columns = np.nonzero((steep > np.quantile(steep, 1.0 - EDGE_SHARE)) & (steep > 1.0))
+    if rows.size == 0:
+        raise NotAPile(Reason.BLANK, "nothing in the picture differs from the rest")
+    size = steep[rows, columns]
+    found: Array = np.stack([columns, rows, gx[rows, columns] / size, gy[rows, columns] / size]).astype(np.float64)
+    return found
+
+
+def _goes_on(grey: Array, inner: tuple[float, float, float], outer: tuple[float, float, float]) -> bool:
+    """Whether both tones inside a circle, the one above the other, go on as far as a larger one (radius, x, y)."""
+    rows, columns = np.mgrid[: grey.shape[0], : grey.shape[1]]
+    within = np.hypot(columns - inner[1], rows - inner[2]) < RIM * inner[0]
+    ring = np.hypot(columns - outer[1], rows - outer[2]) < RIM * outer[0]
+    ring &= np.hypot(columns - inner[1], rows - inner[2]) > (2.0 - RIM) * inner[0]
+    threshold = otsu(grey[within])
+    if not np.isfinite(threshold) or not ring.any():
+        return False
+    share = float((grey[ring] < threshold).mean())
+    if not BOTH_TONES < share < 1.0 - BOTH_TONES:
+        return False
+    lower = [
+        rows[part & (grey < threshold)].mean() > rows[part & (grey >= threshold)].mean() for part in (within, ring)
+    ]
+    return bool(lower[0] == lower[1])
 
 
 def _refined(edge: Array, x: float, y: float, radius: float) -> tuple[float, float, float, float]:
@@ -200,23 +256,54 @@ def _refined(edge: Array, x: float, y: float, radius: float) -> tuple[float, flo
     return share, x, y, radius
 
 
-def _on_the_edge(grey: Array, x: float, y: float, radius: float) -> tuple[float, float, float]:
-    """The circle through the first steep edge outward in each sector of the picture; outliers weigh little."""
+def _on_the_edge(grey: Array, x: float, y: float, radius: float) -> tuple[float, float, float, float]:
+    """The inner edge of the rim near a circle: middle and radius, and by what share of that it is an ellipse.
+
+    From a few radii on, the steep edge of every sector that is nearest to the rim so far is taken, and the rim put
+    through these, outliers weighing little: within the bed grains have edges too, and a rim has two.
+    """
     azimuth = np.linspace(-np.pi, np.pi, 4 * SECTORS, endpoint=False)
-    out = np.arange((1.0 - NEAR) * radius, (1.0 + NEAR) * radius, 0.5)
+    out = np.arange((1.0 - 2.0 * NEAR) * radius, (1.0 + 2.0 * NEAR) * radius, 0.5)
     px, py = x + out * np.cos(azimuth)[:, None], y + out * np.sin(azimuth)[:, None]
     seen = ndimage.map_coordinates(grey, [py, px], order=1, mode="nearest")
     steep = np.abs(ndimage.gaussian_filter1d(seen, 0.004 * radius + 2.0, axis=1, order=1))
     peak = (steep[:, 1:-1] >= steep[:, :-2]) & (steep[:, 1:-1] > steep[:, 2:])
-    first = np.argmax(peak & (steep[:, 1:-1] >= 0.5 * steep.max(axis=1, keepdims=True)), axis=1) + 1
-    at = out[first]
+    peak &= steep[:, 1:-1] >= FAINT * steep.max(axis=1, keepdims=True)
+    wave = np.cos(2.0 * azimuth), np.sin(2.0 * azimuth)
+    size, scale = EDGE * radius, (1.0, 1.0, 1.0, 0.01, 0.01)
 
-    def off(circle: Array) -> Array:
-        dx, dy = x + at * np.cos(azimuth) - circle[0], y + at * np.sin(azimuth) - circle[1]
-        return np.asarray(np.hypot(dx, dy) - circle[2])
+    def off(rim: Array, at: Array) -> Array:
+        dx, dy = x + at * np.cos(azimuth) - rim[0], y + at * np.sin(azimuth) - rim[1]
+        return np.asarray(np.hypot(dx, dy) - rim[2] * (1.0 + rim[3] * wave[0] + rim[4] * wave[1]))
 
-    found = least_squares(off, (x, y, float(np.median(at))), loss="cauchy", f_scale=0.004 * radius)
-    return float(found.x[0]), float(found.x[1]), float(found.x[2])
+    found: list[tuple[int, Array]] = []
+    for share in np.linspace(1.0 - NEAR, 1.0 + NEAR, 7):
+        rim = np.array([x, y, share * radius, 0.0, 0.0])
+        for _ in range(3):
+            far = np.where(peak, np.abs(off(rim, out[1:-1, None])).T, np.inf)
+            at = out[far.argmin(axis=1) + 1]
+            rim = least_squares(off, rim, loss="cauchy", f_scale=size, x_scale=scale, args=(at,)).x
+        found.append((int(np.count_nonzero(np.abs(off(rim, at)) < size)), rim))
+    rim = max(found, key=lambda one: one[0])[1]
+    # A rim has two edges of one shape; where the bed has its tone the inner one is seen above the bed only.
+    beyond = np.where(peak, off(rim, out[1:-1, None]).T, np.inf)
+    for inward in np.arange(-2.0 * NEAR * radius, -2.0 * size, 0.5 * size):
+        if np.count_nonzero((np.abs(beyond - inward) < size).any(axis=1)) > SEEN_INNER * len(azimuth):
+            rim[2] += float(np.median(beyond[np.abs(beyond - inward) < 2.0 * size]))
+            break
+    return float(rim[0]), float(rim[1]), float(rim[2]), float(np.hypot(rim[3], rim[4]))
+
+
+def _check_circle(grey: Array, x: float, y: float, radius: float, ellipse: float) -> None:
+    """Refuse a drum that is not seen whole, or aslant."""
+    beyond = max(radius - x, radius - y, x + radius - grey.shape[1], y + radius - grey.shape[0])
+    if beyond > OUTSIDE * radius:
+        raise NotAPile(Reason.CUT_BY_FRAME, f"{beyond / radius:.0%} of the drum's radius lie outside the picture")
+    if ellipse > ASLANT:
+        raise NotAPile(
+            Reason.CAMERA_ASLANT,
+            f"the rim is an ellipse, its longer axis {2.0 * ellipse:.1%} over the mean: look along the drum's axis",
+        )
 
 
 # The bed
@@ -262,7 +349,13 @@ def _middle(grey: Array, bed: Image, x: float, y: float, radius: float) -> tuple
     tones = [float(np.median(seen[inside & part])) if (inside & part).any() else 0.0 for part in (rough, ~rough)]
     seen = np.where(beyond, np.where(below, tones[0], tones[1]), seen)
     rough = (rough & inside) | below
-    rough = np.logical_or.accumulate(rough[::-1], axis=0)[::-1]
+    full = np.logical_or.accumulate(rough[::-1], axis=0)[::-1]
+    crossed = float((full & ~rough).sum() / full.sum())
+    if crossed > CROSSED:
+        raise NotAPile(
+            Reason.NO_SURFACE, f"{crossed:.0%} of what lies below the bed's top is no bed: something crosses it"
+        )
+    rough = full
     band = max(3.0, 1.5 * TEXTURE * radius / step)
     return Patch(seen, rough, step, band, (x + float(u[0]), y + radius), (1.0, 0.0)), 0.5 * n * step / radius
 
@@ -275,9 +368,26 @@ def _surface(image: Image, patch: Patch, radius: float) -> Array:
     return np.where(np.hypot(u, tops) < RIM - 2.0 * patch.step / radius, tops, np.nan)
 
 
-def _line_error_deg(x: Array, rough: Array, slope: float) -> float:
-    """Standard error of the line's angle [°]: neighbouring columns are of one grain, so that fewer are independent than
-    there are columns, by the sum of the residuals' autocorrelation up to its first zero."""
+def _check_surface(x: Array, height: Array) -> None:
+    """Refuse what is not seen over the middle half of the drum, or not even."""
+    window = np.abs(x) <= WINDOW
+    known = window & np.isfinite(height)
+    if np.count_nonzero(known) < LEAST_WINDOW * np.count_nonzero(window):
+        raise NotAPile(Reason.NO_SURFACE, "the bed's surface does not reach over the middle half of the drum")
+    off = height[known] - np.polyval(np.polyfit(x[known], height[known], 1), x[known])
+    if float(np.sqrt(np.mean(off**2))) > STRAIGHT:
+        raise NotAPile(Reason.NO_SURFACE, "what stands out in the drum has no even surface")
+
+
+def _line_error_deg(x: Array, height: Array) -> float:
+    """Standard error of the angle of the line through the middle half [°], by how rough the surface is.
+
+    A flowing bed is bent like an S by itself: its roughness is what is left of a cubic. Neighbouring columns are of one
+    grain, so that fewer are independent than there are columns, by the sum of the autocorrelation up to its first zero.
+    """
+    known = (np.abs(x) <= WINDOW) & np.isfinite(height)
+    x, height = x[known], height[known]
+    rough = height - np.polyval(np.polyfit(x, height, 3), x)
     variance = float(rough @ rough)
     if variance <= 0.0:
         return 0.0
@@ -285,6 +395,6 @@ def _line_error_deg(x: Array, rough: Array, slope: float) -> float:
     first_zero = int(np.argmax(correlation <= 0.0)) or correlation.size
     together = 1.0 + 2.0 * float(correlation[1:first_zero].sum())
     independent = max(rough.size / together, 5.0)
-    run = x - x.mean()
+    run, slope = x - x.mean(), float(np.polyfit(x, height, 1)[0])
     error = np.sqrt(variance / rough.size / (independent - 4.0) / float(np.mean(run**2)))
     return float(np.degrees(error / (1.0 + slope**2)))

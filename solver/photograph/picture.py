@@ -77,13 +77,14 @@ class Reason(StrEnum):
     SUPPORT = "a body under the pile"
     DRAWN = "a drawing"
     NO_SCALE = "no reference length"
+    CAMERA_ASLANT = "camera looks aslant"
     NO_DRUM = "no drum"
     NO_SURFACE = "no free surface"
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """A picture that is not taken for a pile."""
+    """A picture that gives no reading."""
 
     name: str
     """Of the picture."""
@@ -93,7 +94,7 @@ class Refusal:
 
 
 class NotAPile(Exception):
-    """Ends the reading of a picture; :func:`~solver.photograph.read.read_photograph` makes it a :class:`Refusal`."""
+    """Ends the reading of a picture of a pile or of a drum, whose reader makes it a :class:`Refusal`."""
 
     def __init__(self, reason: Reason, detail: str) -> None:
         super().__init__(f"{reason}: {detail}")

@@ -184,7 +184,7 @@ def cautions(result: StudyResult) -> list[str]:
     if len(result.study.targets) == 1 and not optimum.better_than_noise:
         found.append("The response surface is not better than noise: the optimum is a point, not a calibration.")
     observable = result.study.targets[0].observable
-    if not optimum.reached:
+    if len(result.study.targets) == 1 and not optimum.reached:
         found.append(
             f"The target {observed(observable, optimum.target)} ({observable_label(observable)}) lies outside what the "
             "model reaches in its region, "

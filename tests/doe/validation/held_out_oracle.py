@@ -26,14 +26,17 @@ from doe.store import Store, default_store
 from doe.validation.campaign import Answers, CampaignOrder, measured_strengths
 from doe.validation.laboratory import read_laboratory
 from doe.validation.sets import HOLDOUT_GOOD
-from doe.validation.truth import REPLICATES, truth_of
+from doe.validation.truth import truth_of
 from doe.validation.work_place import WorkPlace
 
 DIVISIONS = 200
 
 
 def summaries(answers, readings):
-    """Rows of the held-out conditions' summaries, (pours, d) each, of what a laboratory has read off every pour."""
+    """Rows of the held-out conditions' summaries, (pours, d) each, of what a laboratory has read off every pour.
+
+    A pour of which one could not be read is left out.
+    """
     laboratory = answers.laboratory
     placeholders = [dict.fromkeys(laboratory.readings, 0.0), dict.fromkeys(laboratory.readings, 1.0)]
     data = {one.name: placeholders for one in laboratory.declared.fit} | readings
@@ -43,10 +46,10 @@ def summaries(answers, readings):
     return [(one.name, summary_names(one), complete_rows(one)) for one in held]
 
 
-def ratio(rows, first, generator=None):
-    """Error over noise floor where ``first`` rows of each condition are the measured ones."""
+def ratio(rows, generator=None):
+    """Error over noise floor where the first rows of each condition are the measured ones."""
     conditions = []
-    for name, names, values in rows:
+    for name, names, first, values in rows:
         order = np.arange(len(values)) if generator is None else generator.permutation(len(values))
         measured, fresh = values[order[:first]], values[order[first:]]
         conditions.append(HoldoutCondition(name, names, measured, fresh, fresh))
@@ -64,12 +67,12 @@ def ratios(answers, case, generator):
     if measured is None or not all(pour.valid for row in poured for pour in row):
         return None
     rows = [
-        (name, names, np.concatenate([values, [row[c].summaries for row in poured]]))
+        (name, names, len(values), np.concatenate([values, [row[c].summaries for row in poured]]))
         for c, (name, names, values) in enumerate(
             summaries(answers, {name: [one.reading for one in data] for name, data in measured.items()})
         )
     ]
-    return ratio(rows, REPLICATES), [ratio(rows, REPLICATES, generator) for _ in range(DIVISIONS)]
+    return ratio(rows), [ratio(rows, generator) for _ in range(DIVISIONS)]
 
 
 def main():

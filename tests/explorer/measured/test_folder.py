@@ -221,6 +221,9 @@ def test_pictures_of_a_drum_s_face_give_its_angle_and_surface(tmp_path):
     assert len(list((folder / "images").iterdir())) == 3
     bad = [*drum, "--photo", "cone_25_30"]
     assert "no drum" in refused(explorer("new", "measurement", tmp_path / "b", *bad))
+    assert "--photo, --angles, --drum: each gives dynamic_angle_deg" in refused(
+        explorer("new", "measurement", tmp_path / "b", *drum, "--photo", photos[0], "--angles", "28,29")
+    )
     assert "--scale: of pictures of a drum" in refused(
         explorer("new", "measurement", tmp_path / "b", *drum, "--photo", photos[0], "--scale", "0.2")
     )

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from solver.assets import asset_path
 from solver.observables.free_surface import column_places, slope_angle_deg, surface_heights
@@ -34,8 +35,8 @@ def test_a_drawn_bed_has_its_angle(name, angle):
     assert abs(read.angle_deg - angle) < 3.0 * read.error_deg + np.degrees(0.1 / look.radius)
     assert read.error_deg < 0.6
     assert read.carried == "left"
-    assert np.hypot(read.circle.x - look.at[0], read.circle.y - look.at[1]) < 0.03 * look.radius
-    assert read.circle.radius == pytest.approx(look.radius, rel=0.08)  # with its rim, where that is the clearer edge
+    assert np.hypot(read.circle.x - look.at[0], read.circle.y - look.at[1]) < 0.01 * look.radius
+    assert read.circle.radius == pytest.approx(look.radius, rel=0.01)
 
 
 def test_the_errors_are_of_the_right_size():
@@ -102,6 +103,47 @@ def test_what_is_no_drum_is_refused_by_name(picture, reason):
     read = read_drum(picture())
     assert isinstance(read, Refusal), read.angle_deg
     assert read.reason in reason, read.detail
+
+
+GREY, FACE = drawn(plane(30.0), Look(grains=10.0)).grey.astype(np.float64), Look()
+X = (np.arange(FACE.width) - FACE.at[0]) / FACE.radius
+Y = (FACE.at[1] - np.arange(FACE.height))[:, None] / FACE.radius
+R = np.hypot(X, Y)
+
+
+def seen(grey):
+    return Picture("drum", np.clip(grey, 0, 255).astype(np.float32), grey.shape[1], grey.shape[0], 1)
+
+
+@pytest.mark.parametrize(
+    ("grey", "reason"),
+    [
+        (np.where((np.abs(Y - 0.25) < 0.025) & (R < 1.0), 80.0, GREY), Reason.NO_SURFACE),  # a bar
+        (np.where((Y > 0.0) & (Y < 0.4) & (R < 1.0), GREY - 70.0, GREY), Reason.NO_SURFACE),  # a reflection
+        (np.where((np.abs(0.5 * X - 0.866 * Y) < 0.03) & (R < 1.0), 60.0, GREY), Reason.NO_SURFACE),  # a spoke
+        (np.where(np.abs(R - 0.6) < 0.012, 30.0, GREY), Reason.NO_SURFACE),  # a ring
+        (ndimage.zoom(GREY, (1, 0.97)), Reason.CAMERA_ASLANT),
+        (GREY[:, 180:], Reason.CUT_BY_FRAME),
+        (np.where(R < 1.0, 255.0, GREY), Reason.BLANK),  # overexposed
+        (np.where(R < 1.0, 190.0 * (1.0 + 0.4 * (X + Y)), GREY), Reason.NO_SURFACE),  # empty, under slanting light
+        (drawn(plane(0.0), Look()).grey.astype(np.float64), Reason.NO_SURFACE),  # at rest
+    ],
+)
+def test_what_would_be_read_wrong_is_refused(grey, reason):
+    read = read_drum(seen(grey))
+    assert isinstance(read, Refusal), read.angle_deg
+    assert read.reason == reason, read.detail
+
+
+def test_a_thin_ring_inside_or_a_motor_beside_it_is_not_the_drum():
+    """A faint line at 0.9 of the radius, and a round two-toned thing beside the drum."""
+    rows, columns = np.mgrid[: FACE.height, : FACE.width]
+    off = np.hypot(columns - 800.0, rows - 120.0)
+    motor = np.where(off < 70.0, np.where(rows > 120, 60.0, 200.0), GREY)
+    for grey in (np.where(np.abs(R - 0.9) < 0.004, GREY - 25.0, GREY), motor):
+        read = read_drum(seen(grey))
+        assert read.circle.radius == pytest.approx(FACE.radius, rel=0.01)
+        assert read.angle_deg == pytest.approx(30.0, abs=0.2)
 
 
 def test_no_picture_ends_otherwise_than_by_a_reading_or_a_refusal():
