@@ -67,7 +67,8 @@ def _pile_lines(condition: Condition) -> Iterator[str]:
     elif offer == PROFILE:
         yield f"whole pile: heights over the radius: {profile} numbers of its profile; a scan would add {surface}"
     else:
-        yield f"whole pile: no more than {scalars} scalars; a scan would add {profile + surface} numbers"
+        only = "one scalar" if scalars == 1 else f"{scalars} scalars"
+        yield f"whole pile: no more than {only}; a scan would add {profile + surface} numbers"
 
 
 def _number_of_values(observation: Observation) -> int:

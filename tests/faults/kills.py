@@ -12,6 +12,7 @@ store is whole, every pour that was in it is in it with the same bits, and the c
 
 import argparse
 import contextlib
+import difflib
 import hashlib
 import json
 import os
@@ -28,8 +29,8 @@ from pathlib import Path
 from doe.store_upkeep import bits
 
 ROOT = Path(__file__).parents[2]
-OF_THE_RUN = {"timing", "about", "versions", "reused", "wall_s", "seconds"}
-"""Keys of a result that tell of the run, not of what it found."""
+OF_THE_RUN = {"timing", "about", "versions", "reused", "wall_s", "seconds", "out", "run"}
+"""Keys of a result that tell of the run, not of what it found: its folder and how many pours it made itself, too."""
 MOST_POURS, LATEST = 6, 3.0
 """A command is killed at most so many new pours after its start, and so many seconds [s] later."""
 VICTIMS = ("command", "worker", "all")
@@ -52,7 +53,10 @@ class Order:
 
 ORDERS = {
     "study": Order(("explorer", "calibrate", "--headless", "--profile", "quick"), "result.json"),
-    "diagnosis": Order(("explorer", "diagnose", "trefoil_2", "--budget", "120"), "diagnosis.json"),
+    "diagnosis": Order(
+        ("explorer", "diagnose", "trefoil_2", "--budget", "40", "--effects", "rolling_resistance,air_drag"),
+        "diagnosis.json",
+    ),
     "page": Order(("tests.faults.page_host",), "result.json", ("page", *VICTIMS)),
 }
 
@@ -213,8 +217,10 @@ def main() -> int:
         story = campaign(order, Path(place, "killed"), asked.kills, draw)
         left_alone = unbroken(order, Path(place, "unbroken"))
         if not story.faults:
-            results = (found_in(path) for path in (left_alone, order.found(Path(place, "killed"))))
-            story.faults += [] if len(set(results)) == 1 else ["the result is another"]
+            results = [found_in(path).splitlines() for path in (left_alone, order.found(Path(place, "killed")))]
+            if differing := list(difflib.unified_diff(*results, "unbroken", "killed", n=2, lineterm="")):
+                print("\n".join(differing[:200]))
+                story.faults.append("the result is another")
             alike = kept(Path(place, "unbroken/pours.sqlite")) == kept(Path(place, "killed/pours.sqlite"))
             story.faults += [] if alike else ["the pours are others"]
         if story.faults:
