@@ -132,7 +132,7 @@ def _read(picture: Picture) -> PhotographedDrum:
     patch, half = _middle(grey, bed, x, y, radius)
     images = silhouettes(patch, pixel_noise(grey)).images
     places: Array = (np.arange(patch.grey.shape[1], dtype=np.float64) + 0.5) * patch.step / radius - half
-    low, height, high = (_surface(image, patch, radius) for image in images)
+    low, height, high = (_surface(image, places, patch.step / radius) for image in images)
     _check_surface(places, height)
     angle = slope_angle_deg(places, height, WINDOW)
     if abs(angle) < LEAST_ANGLE:
@@ -355,17 +355,15 @@ def _middle(grey: Array, bed: Image, x: float, y: float, radius: float) -> tuple
         raise NotAPile(
             Reason.NO_SURFACE, f"{crossed:.0%} of what lies below the bed's top is no bed: something crosses it"
         )
-    rough = full
     band = max(3.0, 1.5 * TEXTURE * radius / step)
-    return Patch(seen, rough, step, band, (x + float(u[0]), y + radius), (1.0, 0.0)), 0.5 * n * step / radius
+    return Patch(seen, full, step, band, (x + float(u[0]), y + radius), (1.0, 0.0)), 0.5 * n * step / radius
 
 
-def _surface(image: Image, patch: Patch, radius: float) -> Array:
-    """Heights of the surface from the drum's centre over the radius; NaN where the bed ends at the wall."""
-    tops: Array = column_tops(image).astype(np.float64) * patch.step / radius - 1.0
-    n = tops.size
-    u = ((np.arange(n) + 0.5) - 0.5 * n) * patch.step / radius
-    return np.where(np.hypot(u, tops) < RIM - 2.0 * patch.step / radius, tops, np.nan)
+def _surface(image: Image, places: Array, pixel: float) -> Array:
+    """Heights of the surface from the drum's centre at ``places``; NaN where the bed ends at the wall. All over the
+    radius, so is the side of a ``pixel``."""
+    tops: Array = column_tops(image).astype(np.float64) * pixel - 1.0
+    return np.where(np.hypot(places, tops) < RIM - 2.0 * pixel, tops, np.nan)
 
 
 def _check_surface(x: Array, height: Array) -> None:
