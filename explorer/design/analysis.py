@@ -27,7 +27,7 @@ from doe.designs.morris import Morris
 from doe.errors import StatisticsError
 from explorer.design.choices import ModelOrder, Reduction, Surrogate
 from explorer.design.factors_file import read_factors, region_of
-from explorer.design.filled_sheet import Runs, read_sheet, runs_of
+from explorer.design.filled_sheet import Runs, read_sheet, runs_of, short
 from explorer.design.result import DesignResult, Response, RunCount, SheetFactor
 from explorer.design.run_plan import BLOCK
 from explorer.errors import CommandError
@@ -297,7 +297,8 @@ def _refuse_dependent(runs: Runs, region: Region, sheet: str) -> None:
 def _run_notes(runs: Runs, region: Region, found: DesignAnalysis) -> list[str]:
     """What single runs ask for: levels far outside a factor's range, and runs without which there is no model."""
     row, replicate = np.nonzero(~np.isnan(runs.responses))
-    labels, notes = _labels(runs), []
+    labels = _labels(runs)
+    notes = [f"Run {label} is left out, as the sheet says: {short(why)}." for label, why in runs.excluded]
     for factor in runs.factors:
         if factor.levels and found.named is None and len(factor.levels) == 2:
             notes.append(f"{factor.name}: −1 is {factor.levels[0]}, +1 is {factor.levels[1]}.")

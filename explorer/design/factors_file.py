@@ -22,7 +22,9 @@ NAME = re.compile(r"[^\W\d][\w-]{0,59}")
 UNIT = re.compile(r"[^\s=@|,;\[\]\"'`<>][^|,;\[\]\"`<>\n]{0,19}")
 LEVEL = re.compile(r"[^\s=@|,;\[\]\"'`<>][^|,;\[\]\"`<>\n]{0,39}")
 RESPONSE = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\]]*)\]\s*")
-RESERVED = ("row", "replicate", "run", "seed")
+EXCLUDED = "excluded"
+"""Column of the sheet that says why a run is left out of the analysis; empty where it is not."""
+RESERVED = ("row", "replicate", "run", "seed", EXCLUDED)
 """Columns of the sheet that are not factors."""
 MOST_FACTORS = 47
 

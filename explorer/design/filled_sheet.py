@@ -20,7 +20,15 @@ import numpy.typing as npt
 from doe.analysis.surface import Blocks
 from doe.errors import StudyFileError
 from doe.table_file import CellTable, read_table
-from explorer.design.factors_file import RESERVED, DesignFactor, make_factor, make_names, no_repeats, region_of
+from explorer.design.factors_file import (
+    EXCLUDED,
+    RESERVED,
+    DesignFactor,
+    make_factor,
+    make_names,
+    no_repeats,
+    region_of,
+)
 from explorer.errors import CommandError
 
 Array = npt.NDArray[np.float64]
@@ -71,6 +79,11 @@ class Sheet:
                 "allowed: a number, or an empty cell for a missing run"
             )
         return value
+
+    def why_excluded(self, position: int) -> str:
+        """Why a run is left out; empty where it is not."""
+        text = self.cells[position][self.columns[EXCLUDED]] if EXCLUDED in self.columns else ""
+        return "" if text in EMPTY_CELLS else text
 
     def level(self, position: int, factor: DesignFactor) -> float:
         """The level of a factor, for names their coded value; NaN where the cell is empty."""
@@ -192,6 +205,8 @@ class Runs:
     """In which each run was made; None where no column says."""
     groups: Blocks | None = None
     """The same of groups that are drawn at random."""
+    excluded: tuple[tuple[str, str], ...] = ()
+    """What each run with a result that is left out is called, and why it is."""
     grouping: tuple[str, ...] = ()
     """Columns without a use whose cells repeat, as those of days, batches or operators do."""
 
@@ -213,6 +228,11 @@ def runs_of(sheet: Sheet, response: str, only: Sequence[str] = (), block: str = 
     values = [sheet.number(position, response) for position in range(len(sheet.cells))]
     if all(map(math.isnan, values)):
         raise CommandError(f"{sheet.path}, column {response}: every cell is empty; fill in what came out of the runs")
+    excluded = [k for k, value in enumerate(values) if sheet.why_excluded(k) and not math.isnan(value)]
+    for k in excluded:
+        values[k] = math.nan
+    if all(map(math.isnan, values)):
+        raise CommandError(f"{sheet.path}, column {EXCLUDED}: every run with a result in {response} is left out")
     natural = np.array([_levels(sheet, factors, k, not math.isnan(value)) for k, value in enumerate(values)])
     used = np.flatnonzero(~np.isnan(natural).any(axis=1))
     coded = _snapped(region_of(factors).coded(natural[used]))
@@ -239,6 +259,7 @@ def runs_of(sheet: Sheet, response: str, only: Sequence[str] = (), block: str = 
         blocks=_blocks(sheet, block, positions, width),
         groups=_blocks(sheet, random, positions, width),
         place=place,
+        excluded=tuple((_label(sheet, k), sheet.why_excluded(k)) for k in excluded),
         grouping=tuple(
             name for name in sheet.responses if name not in (response, block, random) and _groups(sheet, name)
         ),
@@ -252,7 +273,9 @@ def finished_runs(sheet: Sheet, responses: Sequence[str]) -> tuple[Array, tuple[
     """
     known = [name for name in responses if name in sheet.columns]
     filled = [
-        k for k, row in enumerate(sheet.cells) if any(row[sheet.columns[name]] not in EMPTY_CELLS for name in known)
+        k
+        for k, row in enumerate(sheet.cells)
+        if not sheet.why_excluded(k) and any(row[sheet.columns[name]] not in EMPTY_CELLS for name in known)
     ]
     if not filled:
         raise CommandError(f"{sheet.path}: no run with a result in {', '.join(responses)}; allowed: a filled sheet")

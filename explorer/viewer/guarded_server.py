@@ -183,18 +183,13 @@ def _for_hosts(
 ) -> Callable[[Any, Any], Any]:
     """The answer of ``pages``, or viser's ``answer`` (to an HTTP request or the opening of a WebSocket), for ``hosts``
     and whoever knows the ``token``; 421 for others, 401 and a form for those without a token."""
-    cookie_value = None if token is None else hmac.new(token.encode(), b"page", sha256).hexdigest()
 
     def process_request(connection: Any, request: Any) -> Any:
         named = [name.lower() for name in request.headers.get_all("Host")]
         if len(named) != 1 or named[0] not in hosts:
             return connection.respond(HTTPStatus.MISDIRECTED_REQUEST, "This server has another name.\n")
-        if (
-            token is not None
-            and cookie_value is not None
-            and not _has_cookie(request, cookie_name(token), cookie_value)
-        ):
-            return _login_response(connection, request, token, cookie_value)
+        if token is not None and not has_cookie(request.headers.get_all("Cookie"), *token_cookie(token)):
+            return _login_response(connection, request, token)
         if "Upgrade" in request.headers and len(connection.server.connections) >= MOST_SOCKETS:
             return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "Too many browsers are at this page.\n")
         own = None if pages is None else pages.answer(request)
@@ -203,21 +198,22 @@ def _for_hosts(
     return process_request
 
 
-def cookie_name(token: str) -> str:
-    """The cookie of pages with this token, on whatever port: a recording is played on one of its own."""
-    return f"explorer_{sha256(token.encode()).hexdigest()[:8]}"
+def token_cookie(token: str) -> tuple[str, str]:
+    """Name and value of the cookie of pages with this token, on whatever port: recordings and tables have their own."""
+    value = hmac.new(token.encode(), b"page", sha256).hexdigest()
+    return f"explorer_{sha256(token.encode()).hexdigest()[:8]}", value
 
 
-def _has_cookie(request: Any, name: str, cookie_value: str) -> bool:
-    """Whether a browser sends the cookie ``name`` that it got for the token."""
+def has_cookie(sent: Sequence[str], name: str, value: str) -> bool:
+    """Whether the headers ``sent`` by a browser hold the cookie ``name`` that it got for the token."""
     try:
-        cookies = SimpleCookie("; ".join(request.headers.get_all("Cookie")))
+        cookies = SimpleCookie("; ".join(sent))
     except CookieError:
         return False
-    return name in cookies and hmac.compare_digest(cookies[name].value.encode(), cookie_value.encode())
+    return name in cookies and hmac.compare_digest(cookies[name].value.encode(), value.encode())
 
 
-def _login_response(connection: Any, request: Any, token: str, cookie_value: str) -> Any:
+def _login_response(connection: Any, request: Any, token: str) -> Any:
     """To an address with the token: the cookie, and the same address without it. To others: a form for it."""
     path, _, query = request.path.partition("?")
     asked = parse_qsl(query, keep_blank_values=True)
@@ -232,7 +228,7 @@ def _login_response(connection: Any, request: Any, token: str, cookie_value: str
         # One slash: with two, what follows would be another server.
         response.headers["Location"] = "/" + path.lstrip("/\\") + (f"?{rest}" if rest else "")
         kept = f"Max-Age={COOKIE_DAYS * 86400}; Path=/; HttpOnly; SameSite=Lax"
-        response.headers["Set-Cookie"] = f"{cookie_name(token)}={cookie_value}; {kept}"
+        response.headers["Set-Cookie"] = "=".join(token_cookie(token)) + f"; {kept}"
     response.headers["Cache-Control"] = "no-store"
     return response
 

@@ -31,6 +31,8 @@ from explorer.viewer.pour.beside_pile import BesidePile
 from explorer.viewer.pour.ghost import Ghost
 from explorer.viewer.shell.channel import ShellChannel
 from explorer.viewer.shell.web_pages import WebPages
+from explorer.viewer.tables.sheet_page import SheetInHand
+from explorer.viewer.tables.table_server import TableServer
 
 OFTEN, SELDOM = 0.2, 0.5
 """Seconds between two looks of a panel: at the pour, and at what runs in the background."""
@@ -113,6 +115,16 @@ class PageContext:
     def bench_work(self) -> BackgroundWork:
         """Work of the laboratory, beside the other."""
         return BackgroundWork(self.post)
+
+    @cached_property
+    def tables(self) -> TableServer:
+        """Pages with tables to fill in and pictures to click."""
+        return TableServer(self.pages, self.server.token)
+
+    @cached_property
+    def sheet(self) -> SheetInHand:
+        """The sheet of a designed experiment that is filled in and analysed."""
+        return SheetInHand()
 
     @cached_property
     def target(self) -> TargetFile:

@@ -75,3 +75,30 @@ def test_a_sheet_is_taken_along_filled_and_analysed(page, tmp_path):
     press(page, "Analyse")
     seen(page, "explorer analyse")
     shot(page, "design_analysis")
+
+
+def test_the_sheet_is_filled_in_on_the_page_and_a_run_is_left_out(page):
+    """Follows the test above: the sheet that was analysed is the one in the table."""
+    with page.expect_popup() as opened:
+        page.get_by_role("link", name="Fill in this sheet in a table").click()
+    table = opened.value
+    table.set_default_timeout(PATIENCE)
+    first = table.locator("[role=row][row-index='0'] [role=gridcell]")
+    first.last.wait_for()
+    assert table.url.startswith("http://127.0.0.1:")
+    write_into(table, first.nth(-2), "31,5")
+    write_into(table, first.last, "the cup slipped")
+    table.get_by_role("button", name="Save").click()
+    table.get_by_role("status").filter(has_text="Saved, and chosen").wait_for()
+    shot(table, "design_table")
+    table.close()
+    page.wait_for_function("[...document.querySelectorAll('input')].some(one => /_filled-\\w+\\.csv$/.test(one.value))")
+    press(page, "Analyse")
+    seen(page, "is left out, as the sheet says: 'the cup slipped'.")
+
+
+def write_into(table, cell, text):
+    cell.dblclick()
+    table.keyboard.type(text)
+    table.keyboard.press("Enter")
+    cell.filter(has_text=text).wait_for()

@@ -9,9 +9,12 @@ from explorer.laboratory.command_results import analysis_result
 from explorer.viewer.laboratory.answer_view import AnswerView
 from explorer.viewer.laboratory.inputs import UploadSlot, number_or_none, parts_of
 from explorer.viewer.panel import LABORATORY, PageContext, Panel
+from explorer.viewer.tables.sheet_page import sheet_page
+from explorer.viewer.tables.table_server import link_html
+from explorer.viewer.view import small_html
 from solver.assets import shipped_assets
 
-FILLED = "Fill the results into the sheet, upload it, then: Analyse."
+FILLED = "Fill in the results here or in a file of your own, which you upload, then: Analyse."
 HIGHEST = "highest that the runs bear"
 REDUCTIONS = {
     "no": None,
@@ -19,6 +22,7 @@ REDUCTIONS = {
     "while p > 0.05": Reduction.P,
 }
 """Choice → rule by which terms are dropped."""
+FILL_IN = "Fill in this sheet in a table"
 NO_FACTORS = "as the sheet says"
 
 
@@ -33,6 +37,9 @@ class AnalysisPanel(Panel):
         self._filled = UploadSlot(
             server, "Sheet", shipped_assets("runs"), SUFFIXES, folder, post, "From any laboratory or engine."
         )
+        page.sheet.slot = self._filled
+        self._tables = page.tables
+        gui.add_html(small_html(link_html(page.tables.publish(sheet_page(page.sheet, post)), FILL_IN)))
         self._response = gui.add_text("Response", "", hint="Column to analyse; empty where there is only one.")
         self._target = gui.add_text("Target", "", hint="Value that the response should have; empty: none.")
         self._target_error = gui.add_text("Standard error of the target", "", hint="In its unit; empty: 0.")
@@ -74,6 +81,10 @@ class AnalysisPanel(Panel):
     def set_dark(self, dark: bool) -> None:
         """Charts for a dark page, or a light one."""
         self.view.set_dark(dark)
+
+    def close(self) -> None:
+        """End the pages with tables."""
+        self._tables.close()
 
     def _analyse(self) -> None:
         factors = self._factors.chosen

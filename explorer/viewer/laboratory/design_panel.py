@@ -13,7 +13,7 @@ from doe.table_file import SUFFIXES
 from explorer.design.choices import FEWEST, MOST, Alpha, ModelOrder
 from explorer.design.run_plan import DesignOrder
 from explorer.errors import CommandError
-from explorer.laboratory.command_results import SheetOrder, sheet_result
+from explorer.laboratory.command_results import CommandResult, SheetOrder, sheet_result
 from explorer.viewer.laboratory.answer_view import AnswerView
 from explorer.viewer.laboratory.inputs import UploadSlot, number_or_none, parts_of, whole_or_none
 from explorer.viewer.output.send_file import send_file
@@ -23,8 +23,8 @@ from solver.assets import asset_path, shipped_assets
 
 SHEET = (
     "Name your factors in a file (Factors file to edit gives one to start from), upload it, or take the shipped one. "
-    "An empty box means: as usual. Then: Make the sheet. Fill in its results, and upload it under Filled sheet → model "
-    "and optimum."
+    "An empty box means: as usual. Then: Make the sheet. It is then chosen under Filled sheet → model and optimum: "
+    "fill it in there, or in a spreadsheet."
 )
 NUMBERS = {
     "runs": ("Size", "Rows of the table or of the fraction, or points; empty: as usual for the design."),
@@ -57,7 +57,7 @@ class DesignPanel(Panel):
 
     def __init__(self, page: PageContext) -> None:
         server, gui, folder, post = page.server, page.server.gui, page.uploads, page.post
-        self._background = page.bench_work
+        self._background, self._sheet = page.bench_work, page.sheet
         self._kind = gui.add_dropdown(
             "Design", tuple(DESIGNS), initial_value="box-behnken", hint="Which runs are made."
         )
@@ -184,4 +184,11 @@ class DesignPanel(Panel):
             workbook=self._format.value == WORKBOOK_FILE,
             decimal_comma=self._format.value == COMMA_TABLE,
         )
-        self._background.start("making the sheet", lambda: sheet_result(order, asked), self.view.show)
+        self._background.start("making the sheet", lambda: sheet_result(order, asked), self._made)
+
+    def _made(self, answer: CommandResult) -> None:
+        """Show the answer; its sheet is the one that is filled in and analysed from now on."""
+        self.view.show(answer)
+        for name, content in answer.files.items():
+            if name.endswith(SUFFIXES):
+                self._sheet.take(name, content)

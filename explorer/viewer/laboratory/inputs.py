@@ -50,7 +50,7 @@ class UploadSlot:
                 chosen = str(event.target.value)
                 post(lambda: follow(chosen))
 
-        on_upload(self.upload, self._take, post)
+        on_upload(self.upload, self.take, post)
 
     @property
     def chosen(self) -> str:
@@ -72,7 +72,8 @@ class UploadSlot:
         self._examples = tuple(examples)
         self._list(str(self._choice.value) if self._choice.value in self._sent else self._examples[0])
 
-    def _take(self, name: str, content: bytes) -> None:
+    def take(self, name: str, content: bytes) -> None:
+        """Add a file that was sent, or made here, and choose it; CommandError where it is none of this kind."""
         path = kept_file(name, content, self._folder, self._suffixes)
         self._sent[path.name] = path
         self._list(path.name)

@@ -97,6 +97,10 @@ class WebPages:
         """Serve ``page`` at ``address`` from now on, in place of one before it."""
         self._pages[address] = lambda: page
 
+    def publish_made(self, address: str, make: Callable[[], WebPage]) -> None:
+        """Serve at ``address`` what ``make`` gives for every request."""
+        self._pages[address] = make
+
     def page(self, address: str) -> WebPage:
         """What is served at ``address``. Raises KeyError where nothing is."""
         return self._pages[address]()
@@ -115,7 +119,7 @@ class WebPages:
         path = request.path.partition("?")[0]
         make = self._pages.get(path)
         if make is None:
-            ours = path.startswith(("/reports/", "/study/", "/diagnosis/", "/shell/"))
+            ours = path.startswith(("/reports/", "/study/", "/diagnosis/", "/shell/", "/tables/"))
             # The channel is a WebSocket, which the server's handler takes.
             return _refusal(HTTPStatus.NOT_FOUND) if ours and "Upgrade" not in request.headers else None
         if path not in ("/", "/index.html") and request.headers.get("Sec-Fetch-Site") in FOREIGN:

@@ -119,7 +119,7 @@ def test_a_pour_starts_with_what_was_measured(bench):
 
 def test_bad_readings_are_one_line_and_the_pour_stays(bench):
     slot = bench.bench._readings
-    bench.actions.post(lambda: slot._take("mine.csv", b"a,b,replicate,angle_deg\nx,y,1,steep\n"))
+    bench.actions.post(lambda: slot.take("mine.csv", b"a,b,replicate,angle_deg\nx,y,1,steep\n"))
     assert finished(bench.actions, bench.background) == ""
     bench.bench._test.value = "inclined_plane"
     for act in (bench.bench._evaluate, bench.bench._pour):
@@ -131,7 +131,7 @@ def test_bad_readings_are_one_line_and_the_pour_stays(bench):
 
 @pytest.mark.parametrize(("name", "content"), [("readings.exe", b"x"), ("readings.csv", b"")])
 def test_what_cannot_be_kept_is_refused(bench, name, content):
-    notice = bench.do(lambda: bench.bench._readings._take(name, content))
+    notice = bench.do(lambda: bench.bench._readings.take(name, content))
     assert "allowed" in notice
     assert not bench.folder.exists() or not list(bench.folder.iterdir())
 
@@ -221,7 +221,7 @@ def test_a_number_that_the_command_refuses_is_refused(bench, entered, words):
 def test_runs_are_added_to_a_sheet_that_was_sent(bench):
     sheet = asset_path("runs", "sunflower_extract").read_bytes()
     choose_design(bench, "d-optimal")
-    assert bench.do(lambda: bench.design._kept._take("first.csv", sheet)) == ""
+    assert bench.do(lambda: bench.design._kept.take("first.csv", sheet)) == ""
     bench.design._numbers["runs"].value = "3"
     assert bench.do(bench.design._make) == ""
     assert "20 rows × 1 = 20 runs" in text_of(bench.design.view)
@@ -238,7 +238,7 @@ def test_a_sheet_is_made_for_the_spreadsheet_that_opens_it_and_comes_back_filled
     ((taken, content),) = bench.design.view._answer.files.items()
     assert taken == name
     assert content.startswith(head)
-    assert bench.do(lambda: bench.analysis._filled._take(name, filled(content, name))) == ""
+    assert bench.do(lambda: bench.analysis._filled.take(name, filled(content, name))) == ""
     assert bench.do(bench.analysis._analyse) == ""
     assert re.search(r"total +[\d.]+ +16\b", text_of(bench.analysis.view))  # degrees of freedom of 17 runs
 
@@ -270,7 +270,7 @@ def test_a_mixture_is_asked_for_its_lattice(bench):
     choose_design(bench, "mixture")
     assert "high less low is not the same" in bench.do(bench.design._make)  # the shipped factors are no parts
     blend = "".join(part % one for one in ("sand", "clay", "silt"))
-    assert bench.do(lambda: bench.design._factors._take("soil.toml", blend.encode())) == ""
+    assert bench.do(lambda: bench.design._factors.take("soil.toml", blend.encode())) == ""
     bench.design._numbers["lattice"].value = "2"
     assert bench.do(bench.design._make) == ""
     assert "--lattice 2" in text_of(bench.design.view)
@@ -300,11 +300,11 @@ def test_a_bench_test_asks_for_what_it_takes(bench):
 
 def test_a_photograph_from_the_browser_is_read_and_shown(bench):
     content = asset_path("photographs", "cone_25_30").read_bytes()
-    assert bench.do(lambda: bench.photograph._photo._take("my pile.JPG", content)) == ""
+    assert bench.do(lambda: bench.photograph._photo.take("my pile.JPG", content)) == ""
     assert bench.do(bench.photograph._read) == ""
     assert "explorer measure" in text_of(bench.photograph.view)
     assert bench.photograph.view._picture is not None
-    assert bench.do(lambda: bench.photograph._photo._take("text.jpg", b"no picture")) == ""
+    assert bench.do(lambda: bench.photograph._photo.take("text.jpg", b"no picture")) == ""
     assert "text" in bench.do(bench.photograph._read)
 
 
@@ -313,7 +313,7 @@ def test_a_checkerboard_tells_the_lens_of_a_photograph(bench, tmp_path):
     pile = save(tmp_path / "pile.png", staged(Stage(30.0, fill=0.8, lens=0.1), replace(LOOK, tilt_deg=3.0)))
     board = save(tmp_path / "board.png", checkerboard(0.1))
     for slot, file in ((panel._photo, pile), (panel._board, board)):
-        assert bench.do(lambda slot=slot, file=file: slot._take(file.name, file.read_bytes())) == ""
+        assert bench.do(lambda slot=slot, file=file: slot.take(file.name, file.read_bytes())) == ""
     assert bench.do(panel._read) == ""
     said = unescape(text_of(panel.view)).replace("\u00a0", " ")
     k, low, high = map(float, re.search(r"lens k</th><td[^>]*>(\S+) \(95 % (\S+) … (\S+)\): pincushion", said).groups())
@@ -335,7 +335,7 @@ def test_a_checkerboard_tells_the_lens_of_a_photograph(bench, tmp_path):
 def test_what_is_no_checkerboard_is_refused_in_a_line(bench):
     panel = bench.photograph
     content = asset_path("photographs", "cone_25_30").read_bytes()
-    assert bench.do(lambda: panel._board._take("board.jpg", content)) == ""
+    assert bench.do(lambda: panel._board.take("board.jpg", content)) == ""
     line = bench.do(panel._read)
     assert "no checkerboard" in line
     assert "\n" not in line
@@ -356,11 +356,11 @@ def test_an_example_comes_with_its_scale_and_ones_own_photograph_with_what_was_e
     assert (scale, bar) == (0.2, 0.0)
     assert "a pixel of it is 0.2 mm" in said
     # The scale of an example is no one's own.
-    assert bench.do(lambda: panel._photo._take("mine.jpg", b"a picture")) == ""
+    assert bench.do(lambda: panel._photo.take("mine.jpg", b"a picture")) == ""
     assert (panel._scale.value, panel._bar.value) == (0.0, 0.0)
     assert "lengths stay in pixels" in panel._ruler_said.content
     panel._scale.value = 0.35
-    assert bench.do(lambda: panel._photo._take("another.jpg", b"another picture")) == ""
+    assert bench.do(lambda: panel._photo.take("another.jpg", b"another picture")) == ""
     assert panel._scale.value == 0.35
     assert choose("cone_25_30")[:2] == (0.0, 100.0)
 
@@ -432,6 +432,8 @@ def test_a_sheet_is_made_and_a_filled_one_analysed(bench):
     assert bench.do(bench.design._make) == ""
     assert "explorer design box-behnken" in text_of(bench.design.view)
     panel = bench.analysis
+    assert "every cell is empty" in bench.do(panel._analyse)  # what was made is chosen, and nobody has filled it in
+    panel._filled._choice.value = "sunflower_extract"
     panel._target.value, panel._target_error.value = "24.68", "0.2"
     assert bench.do(panel._analyse) == ""
     assert "--target 24.68 --target-error 0.2" in text_of(panel.view)
@@ -464,7 +466,7 @@ def test_an_audit_of_the_shipped_article_and_of_an_archive(bench):
 def test_text_from_files_is_shown_as_text(bench):
     slot = bench.bench._readings
     readings = b"a,b,replicate,angle_deg\n" + b"".join(b"<b>x</b>,y,%d,%d.0\n" % (k, 20 + k) for k in range(4))
-    assert bench.do(lambda: slot._take("mine.csv", readings)) == ""
+    assert bench.do(lambda: slot.take("mine.csv", readings)) == ""
     bench.bench._test.value = "inclined_plane"
     bench.do(bench.bench._evaluate)
     assert "<b>x" not in text_of(bench.bench.view)

@@ -68,7 +68,7 @@ class ProjectPage:
         return notice
 
     def read(self, content, name="pile.png", scale=0.5):
-        assert self.do(lambda: self.photograph._photo._take(name, content)) == ""
+        assert self.do(lambda: self.photograph._photo.take(name, content)) == ""
         self.photograph._scale.value = scale
         return self.do(self.photograph._read)
 
@@ -166,7 +166,7 @@ def test_what_shows_no_pile_is_refused_in_a_line(server, folder):
 def test_what_is_kept_is_what_was_read_and_not_what_is_chosen_since(server, folder):
     page = ProjectPage(server, folder)
     assert page.read(picture(24.0), "first.png") == ""
-    page.do(lambda: page.photograph._photo._take("second.png", picture(30.0)))
+    page.do(lambda: page.photograph._photo.take("second.png", picture(30.0)))
     page.photograph._scale.value = 0.0
     assert page.press(page.photograph._use) == ""
     target = load_target(folder / FOLDER)

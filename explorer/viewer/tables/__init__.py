@@ -1,0 +1,1 @@
+"""Pages of NiceGUI beside the page: tables that are filled in, and pictures that are clicked."""
