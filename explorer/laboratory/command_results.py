@@ -39,6 +39,7 @@ from explorer.laboratory.run import LabOrder, analysed, files_of, part_file
 from explorer.measured.folder import NewCondition, write_condition, written_text
 from explorer.measured.readings import Brought
 from explorer.photograph.annotated import sheet
+from explorer.photograph.marks import UNMARKED, Marks
 from explorer.photograph.run import MeasuredPhotographs, MeasureOrder, measure_order, outline_text, run_measure
 from explorer.photograph.target import PhotographedTarget, check_targets, keep_target
 from explorer.report.bench import bench_record, bench_report
@@ -102,6 +103,7 @@ class PhotographReading:
     """File of a picture of one, by the same camera; None: the base line tells the lens."""
     order: MeasureOrder
     measured: MeasuredPhotographs
+    marks: Marks = UNMARKED
 
 
 def example_rulers() -> dict[str, Ruler]:
@@ -160,13 +162,21 @@ def rig_result(scene: Scene, rig: str, values: Mapping[str, float | str], seed: 
     return CommandResult(bench_text(data), line, plots, files)
 
 
-def photograph_reading(photo: str, ruler: Ruler, checkerboard: str | None = None) -> PhotographReading:
+def photograph_reading(
+    photo: str, ruler: Ruler, checkerboard: str | None = None, marks: Marks = UNMARKED
+) -> PhotographReading:
     """The one reading of ``photo`` (file, or a shipped one's name), its lens as the picture ``checkerboard`` tells it.
+
+    ``marks``: what a person marked in it; a length between two of them stands in place of ``ruler``.
 
     Raises CommandError, or PhotographError for what is no picture or no checkerboard.
     """
-    order = measure_order([photo], ruler.scale_mm, ruler.reference_mm, None, "auto", None, None, None, checkerboard)
-    return PhotographReading(photo, ruler, checkerboard, order, run_measure(order))
+    if marks.length_mm is not None:
+        ruler = Ruler(reference_mm=marks.length_mm)
+    options = dict(zip(marks.words[::2], marks.words[1::2], strict=True))
+    ends, base_line = options.get("--reference"), options.get("--baseline", "auto")
+    order = measure_order([photo], ruler.scale_mm, ruler.reference_mm, ends, base_line, None, None, None, checkerboard)
+    return PhotographReading(photo, ruler, checkerboard, order, run_measure(order), marks)
 
 
 def photograph_result(read: PhotographReading) -> CommandResult:
@@ -210,6 +220,7 @@ def measure_words(read: PhotographReading) -> list[str]:
     words = ["measure", read.photo]
     for option, length in (("--scale", read.ruler.scale_mm), ("--reference-length", read.ruler.reference_mm)):
         words += [] if length is None else [option, f"{length:g}"]
+    words += read.marks.words
     return words if read.checkerboard is None else [*words, "--checkerboard", read.checkerboard]
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from tests.browser.served import served
-from tests.browser.test_page import BEGUN, PATIENCE, SETTINGS, room
+from tests.browser.test_page import BEGUN, PATIENCE, SETTINGS, no_serious_fault, room
 from tests.browser.test_photographed_target import seen, shot
 
 pytestmark = pytest.mark.browser
@@ -91,6 +91,7 @@ def test_the_sheet_is_filled_in_on_the_page_and_a_run_is_left_out(page):
     table.get_by_role("button", name="Save").click()
     table.get_by_role("status").filter(has_text="Saved, and chosen").wait_for()
     shot(table, "design_table")
+    no_serious_fault(table)
     table.close()
     page.wait_for_function("[...document.querySelectorAll('input')].some(one => /_filled-\\w+\\.csv$/.test(one.value))")
     press(page, "Analyse")

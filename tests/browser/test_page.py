@@ -280,13 +280,18 @@ def test_rooms_are_reached_in_the_window_of_a_phone(page, address):
 
 @pytest.mark.parametrize("tab", [tab.name for tab in TABS])
 def test_axe_finds_no_serious_fault_in_a_room(page, tab):
+    room(page, tab)
+    no_serious_fault(page)
+
+
+def no_serious_fault(page):
+    """Ask axe-core."""
     from axe_playwright_python.sync_playwright import Axe
 
     def faults():
         found = Axe().run(page, options={"resultTypes": ["violations"]}).response["violations"]
         return [(one["id"], node["html"]) for one in found if one["impact"] in SERIOUS for node in one["nodes"]]
 
-    room(page, tab)
     # Controls that were made a moment ago get their names a moment later.
     found = []
 

@@ -8,7 +8,7 @@ import pytest
 
 from explorer.project.project import new_project
 from tests.browser.served import served
-from tests.browser.test_page import BEGUN, PATIENCE, SETTINGS, room
+from tests.browser.test_page import BEGUN, PATIENCE, SETTINGS, no_serious_fault, room
 
 pytestmark = pytest.mark.browser
 
@@ -111,3 +111,35 @@ def test_it_is_there_after_a_restart_until_it_is_removed(browser, project):
         seen(page, "From the study's file")
         shot(page, "removed")
     assert not (project / "target").exists()
+
+
+def test_the_base_line_and_a_length_are_clicked_in_the_photograph(browser, project):
+    with opened(browser, project) as page:
+        room(page, "Laboratory")
+        page.get_by_text("Photograph → angle of repose").click()
+        with page.expect_popup() as popped:
+            page.get_by_role("link", name="Mark base line or a known length in it").click()
+        table = popped.value
+        table.set_default_timeout(PATIENCE)
+        picture = table.locator(".nicegui-interactive-image, .q-page img").first
+        picture.wait_for()
+        box = picture.bounding_box()
+        for x in (0.1, 0.9):
+            table.mouse.click(box["x"] + x * box["width"], box["y"] + 0.8 * box["height"])
+        table.locator("svg line[stroke-width='2']").wait_for(state="attached")
+        table.get_by_role("button", name="Known length").click()
+        for x in (0.2, 0.4):
+            table.mouse.click(box["x"] + x * box["width"], box["y"] + 0.1 * box["height"])
+        table.wait_for_function("document.querySelectorAll('svg line[stroke-width=\"2\"]').length === 2")
+        table.get_by_role("button", name="Use these marks").click()
+        table.get_by_role("status").filter(has_text="enter it; allowed").wait_for()
+        table.get_by_label("Known length [mm]").fill("80")
+        table.get_by_role("button", name="Use these marks").click()
+        table.get_by_role("status").filter(has_text="Taken for cone_25_30.jpg").wait_for()
+        shot(table, "photograph_marks")
+        no_serious_fault(table)
+        table.close()
+        seen(page, "a length of 80 mm, which stands in place of scale and bar")
+        shot(page, "laboratory_marked")
+        page.get_by_role("button", name="Remove the marks", exact=True).click()
+        seen(page, "Nothing is marked")

@@ -18,10 +18,13 @@ from explorer.laboratory.command_results import (
     photograph_reading,
     photograph_result,
 )
+from explorer.photograph.marks import UNMARKED, Marks
 from explorer.photograph.target import PhotographedTarget, remove_target
 from explorer.viewer.laboratory.answer_view import AnswerView
 from explorer.viewer.laboratory.inputs import UploadSlot, positive
 from explorer.viewer.panel import LABORATORY, SELDOM, Now, PageContext, Panel
+from explorer.viewer.tables.marks_page import PhotographInHand, marks_page
+from explorer.viewer.tables.table_server import link_html
 from explorer.viewer.view import small_html
 from solver.assets import shipped_assets
 
@@ -30,6 +33,8 @@ NO_RULER = (
     "Give the length of a pixel, or of a straight bar in the picture; without either, lengths stay in pixels. Angles "
     "need neither."
 )
+MARK = "Mark base line or a known length in it"
+NOTHING_MARKED = "Nothing is marked: the program finds the base line."
 NO_BOARD = "none: the base line tells the lens"
 OWN = "The study's target is that of its file. What is read off a photograph can take its place."
 
@@ -69,6 +74,11 @@ class PhotographPanel(Panel):
             post,
             "A printed one, by the same camera at the same distance: its corners tell how far the lens bends pictures.",
         )
+        self._marked: tuple[str, Marks] = ("", UNMARKED)
+        in_hand = PhotographInHand(lambda: self._photo.chosen, self._take_marks)
+        gui.add_html(small_html(link_html(page.tables.publish(marks_page(in_hand, post)), MARK)))
+        self._marks_said = gui.add_html("")
+        self._unmark = gui.add_button("Remove the marks", visible=False, hint="The program finds the base line again.")
         self._given = Ruler()
         self._follow(examples[0])
         read = gui.add_button("Read the angle", hint="By the estimator of the simulated piles.")
@@ -89,6 +99,7 @@ class PhotographPanel(Panel):
             hint="Another pile of the same material: mean over all of them, and the standard deviation between them.",
         )
         self._remove = gui.add_button("Remove the target", disabled=True, hint="The study's own holds again.")
+        self._unmark.on_click(lambda _: post(lambda: self._take_marks("", UNMARKED)))
         read.on_click(lambda _: post(self._read))
         beside.on_click(lambda _: post(self._compare))
         self._use.on_click(lambda _: post(lambda: self._keep(anew=True)))
@@ -119,6 +130,21 @@ class PhotographPanel(Panel):
             self._bar.value = ruler.reference_mm or 0.0  # type: ignore[misc]
         self._given = ruler
         self._ruler_said.content = small_html(escape(ruler_words(ruler)))
+        self._tell_marks()
+
+    @property
+    def _marks(self) -> Marks:
+        """In the photograph that is chosen; those in another one do not count."""
+        photo, marks = self._marked
+        return marks if photo == self._photo.chosen else UNMARKED
+
+    def _take_marks(self, photo: str, marks: Marks) -> None:
+        self._marked = (photo, marks)
+        self._tell_marks()
+
+    def _tell_marks(self) -> None:
+        self._marks_said.content = small_html(escape(marks_words(self._marks)))
+        self._unmark.visible = bool(self._marks)
 
     def _read(self) -> None:
         self._answer("reading the photograph", photograph_result)
@@ -129,11 +155,11 @@ class PhotographPanel(Panel):
 
     def _answer(self, what: str, result_of: Callable[[PhotographReading], CommandResult]) -> None:
         """Read the photograph, and show what comes of it; the reading stays for the target."""
-        photo, ruler = self._photo.chosen, self._ruler()
+        photo, ruler, marks = self._photo.chosen, self._ruler(), self._marks
         board = None if self._board.chosen == NO_BOARD else self._board.chosen
 
         def find() -> tuple[PhotographReading, CommandResult]:
-            read = photograph_reading(photo, ruler, board)
+            read = photograph_reading(photo, ruler, board, marks)
             return read, result_of(read)
 
         def done(found: tuple[PhotographReading, CommandResult]) -> None:
@@ -167,3 +193,14 @@ def ruler_words(ruler: Ruler) -> str:
     if ruler.scale_mm is not None:
         return f"An example: a pixel of it is {ruler.scale_mm:g} mm, as entered below."
     return NO_RULER
+
+
+def marks_words(marks: Marks) -> str:
+    """What a person marked, in a sentence."""
+    said = []
+    if marks.base_line is not None:
+        left, right = marks.base_line
+        said.append(f"the base line, {left:.1f} px below the top at the left edge and {right:.1f} px at the right")
+    if marks.length_mm is not None:
+        said.append(f"a length of {marks.length_mm:g} mm, which stands in place of scale and bar")
+    return f"Marked: {', and '.join(said)}." if said else NOTHING_MARKED

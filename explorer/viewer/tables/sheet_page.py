@@ -62,7 +62,7 @@ def _build(in_hand: SheetInHand, post: Post) -> None:
     except (CommandError, ValueError) as error:
         ui.label(str(error)).props("role=alert")
         return
-    ui.label(f"{TITLE}: {sheet.path.name}").classes("text-h6")
+    ui.label(f"{TITLE}: {sheet.path.name}").classes("text-h6").props("role=heading aria-level=1")
     ui.label(HOW)
     grid = ui.aggrid(
         {
@@ -83,7 +83,7 @@ def _build(in_hand: SheetInHand, post: Post) -> None:
             return
         told.text = await done_by(post, lambda: in_hand.take(name, content)) or SAVED.format(name)
 
-    ui.button("Save", on_click=save)
+    ui.button("Save", on_click=save).props("no-caps")
 
 
 def editable(sheet: Sheet) -> tuple[str, ...]:

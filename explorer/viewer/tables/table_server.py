@@ -13,6 +13,7 @@ import threading
 from collections.abc import Awaitable, Callable, MutableMapping
 from concurrent.futures import Future
 from dataclasses import dataclass
+from functools import partial
 from html import escape
 from http import HTTPStatus
 from typing import Any
@@ -30,6 +31,8 @@ LOADING = "The tables are being loaded …"
 MOST_CONNECTIONS, MOST_MESSAGE_BYTES = 64, 4_000_000
 FAREWELL = 2.0
 """Seconds in which the server has to end."""
+BRAND = "#1f6ea5"
+"""Of buttons: white on it has a contrast of 5.5 : 1."""
 REPLY = 30.0
 """Seconds in which the page's loop has to have done what was posted."""
 LEAD_ON = """<!doctype html><title>Tables</title><p>{said}</p><script>
@@ -38,6 +41,15 @@ if (!here) document.querySelector("p").textContent = {elsewhere!r};
 else if (port) location.replace(`http://${{location.hostname}}:${{port}}/{name}`);
 else if ({wait}) setTimeout(() => location.reload(), 300);
 </script>"""
+NAMES = """<script>
+document.documentElement.lang = "en";
+new MutationObserver(() => {
+  for (const one of document.querySelectorAll("img:not([alt])")) one.alt = document.title;
+  const bars = document.querySelectorAll(".q-loading-bar:not([aria-label])");
+  for (const one of bars) one.setAttribute("aria-label", "Loading");
+}).observe(document.documentElement, {childList: true, subtree: true});
+</script>"""
+"""What a screen reader asks for and NiceGUI leaves out."""
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -101,7 +113,7 @@ class TableServer:
             return
         application = FastAPI(openapi_url=None)
         for page in self._made.values():
-            ui.page(f"/{page.name}", title=page.title)(page.build)
+            ui.page(f"/{page.name}", title=page.title)(partial(_as_ours, page.build))
         ui.run_with(application, title="Tables", dark=None, show_welcome_message=False)
         self._port = free_port(HOST, 0)
         options = uvicorn.Config(
@@ -157,6 +169,14 @@ class TableGuard:
         if self._token is not None and not has_cookie(_headers(scope, b"cookie"), *token_cookie(self._token)):
             return HTTPStatus.UNAUTHORIZED
         return None
+
+
+def _as_ours(build: Callable[[], None]) -> None:
+    from nicegui import ui
+
+    ui.colors(primary=BRAND)
+    ui.add_head_html(NAMES)
+    build()
 
 
 def _headers(scope: Scope, name: bytes) -> list[str]:

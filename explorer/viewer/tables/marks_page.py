@@ -1,0 +1,130 @@
+"""The photograph that is read, to be clicked: two points of the base line, and both ends of a known length."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from PIL import Image, ImageOps
+
+from explorer.errors import CommandError
+from explorer.photograph.marks import UNMARKED, Marks, Point, base_line_through, known_length
+from explorer.viewer.actions import Post
+from explorer.viewer.tables.table_server import TablePage, done_by
+from solver.assets import asset_path
+from solver.photograph import open_picture
+
+if TYPE_CHECKING:
+    from nicegui.events import MouseEventArguments
+
+TITLE = "Marks in the photograph"
+BASE, LENGTH = "Base line", "Known length"
+HOW = (
+    "Click two points of what is marked: two of the plate beside the pile, or both ends of a length that you know. "
+    "What is not marked is found by the program. Two more clicks mark it anew."
+)
+TAKEN = "Taken for {}: now Read the angle."
+MOST_SHOWN = 1800
+"""Longest side of the picture as it is shown [px]; clicks are told in pixels of the picture itself."""
+COLOURS = {BASE: "#e69f00", LENGTH: "#56b4e9"}
+
+
+@dataclass
+class PhotographInHand:
+    """The photograph that is read: ``chosen`` gives its file or name, ``take`` the marks that a person made in it."""
+
+    chosen: Callable[[], str]
+    take: Callable[[str, Marks], None]
+
+
+@dataclass
+class Clicks:
+    """Points that were clicked in a picture of ``width`` [px], by what they mark; two of each at most."""
+
+    width: int
+    points: dict[str, list[Point]] = field(default_factory=lambda: {BASE: [], LENGTH: []})
+
+    def add(self, what: str, point: Point) -> None:
+        """One more; the third begins anew."""
+        before = self.points[what]
+        self.points[what] = [point] if len(before) == 2 else [*before, point]
+
+    def marks(self, length_mm: float | None) -> Marks:
+        """What is marked by two points each. Raises CommandError where one point is missing, or nothing is marked."""
+        for what, points in self.points.items():
+            if len(points) == 1:
+                raise CommandError(f"{what.lower()}: one point is marked; click the other one")
+        marks = UNMARKED
+        if ends := self.points[LENGTH]:
+            marks = known_length(ends[0], ends[1], length_mm)
+        if base := self.points[BASE]:
+            marks = replace(marks, base_line=base_line_through(base[0], base[1], self.width))
+        return marks
+
+    def drawn(self, scale: float) -> str:
+        """The points and the lines between them as SVG of the picture that is shown, ``scale`` times the size."""
+        shapes = []
+        for what, points in self.points.items():
+            places = [((x + 0.5) * scale, (y + 0.5) * scale) for x, y in points]
+            style = f'stroke="{COLOURS[what]}" stroke-width="2" fill="none"'
+            shapes += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="6" {style} />' for x, y in places]
+            if len(places) == 2:
+                (x0, y0), (x1, y1) = places
+                shapes.append(f'<line x1="{x0:.1f}" y1="{y0:.1f}" x2="{x1:.1f}" y2="{y1:.1f}" {style} />')
+        return "".join(shapes)
+
+
+def marks_page(in_hand: PhotographInHand, post: Post) -> TablePage:
+    """The page on which the photograph in hand is marked."""
+    return TablePage("photograph", TITLE, lambda: _build(in_hand, post))
+
+
+def _build(in_hand: PhotographInHand, post: Post) -> None:
+    from nicegui import ui
+
+    photo = in_hand.chosen()
+    try:
+        path = asset_path("photographs", photo)
+        width = open_picture(path).width
+        address, shown = _as_shown(path.read_bytes())
+    except (ValueError, OSError) as error:
+        ui.label(str(error)).props("role=alert")
+        return
+    scale = shown / width
+    clicks = Clicks(width)
+    ui.label(f"{TITLE}: {path.name}").classes("text-h6").props("role=heading aria-level=1")
+    ui.label(HOW)
+    with ui.row().classes("items-center"):
+        what = ui.toggle([BASE, LENGTH], value=BASE).props("no-caps")
+        length = ui.number(f"{LENGTH} [mm]", min=0.0, step=0.1)
+
+    def clicked(event: MouseEventArguments) -> None:
+        clicks.add(what.value, (event.image_x / scale - 0.5, event.image_y / scale - 0.5))
+        picture.content = clicks.drawn(scale)
+
+    picture = ui.interactive_image(address, on_mouse=clicked, events=["mousedown"], cross=True)
+    picture.style("max-height: calc(100vh - 17rem)")
+    told = ui.label("").props("role=status")
+
+    async def use() -> None:
+        try:
+            marks = clicks.marks(length.value)
+        except CommandError as error:
+            told.text = str(error)
+            return
+        told.text = await done_by(post, lambda: in_hand.take(photo, marks)) or TAKEN.format(path.name)
+
+    ui.button("Use these marks", on_click=use).props("no-caps")
+
+
+def _as_shown(content: bytes) -> tuple[str, int]:
+    """A photograph as it is seen, no larger than is shown, as the address of an image; and its width [px]."""
+    with Image.open(io.BytesIO(content)) as opened:
+        seen = ImageOps.exif_transpose(opened).convert("RGB")
+    seen.thumbnail((MOST_SHOWN, MOST_SHOWN))
+    file = io.BytesIO()
+    seen.save(file, "JPEG", quality=90)
+    return "data:image/jpeg;base64," + base64.b64encode(file.getvalue()).decode(), seen.width
