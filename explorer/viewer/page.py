@@ -117,6 +117,7 @@ class Page:
         """End what panels have started: a second pour, and a recording, with its file whole."""
         for panel in self.panels.values():
             panel.close()
+        self._context.tables.close()
 
     def run(self, stop: threading.Event) -> None:
         """Keep the page up to date until ``stop`` is set."""

@@ -98,6 +98,24 @@ def test_the_sheet_is_filled_in_on_the_page_and_a_run_is_left_out(page):
     seen(page, "is left out, as the sheet says: 'the cup slipped'.")
 
 
+def test_all_ranges_are_changed_in_one_table(page):
+    room(page, "Calibrate")
+    page.get_by_text("Ranges and target of the next study", exact=True).click()
+    with page.expect_popup() as opened:
+        page.get_by_role("link", name="All ranges in a table").click()
+    table = opened.value
+    table.set_default_timeout(PATIENCE)
+    low = table.get_by_role("row").filter(has_text="X4").get_by_role("gridcell").nth(3)
+    low.filter(has_text="40.1").wait_for()
+    write_into(table, low, "30,5")
+    table.get_by_role("button", name="Save").click()
+    table.get_by_role("status").filter(has_text="Saved").wait_for()
+    shot(table, "ranges_table")
+    no_serious_fault(table)
+    table.close()
+    page.get_by_role("row").filter(has_text="X4 low").filter(has_text="30.5 MPa").wait_for()
+
+
 def write_into(table, cell, text):
     cell.dblclick()
     table.keyboard.type(text)

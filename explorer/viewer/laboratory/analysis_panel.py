@@ -38,7 +38,6 @@ class AnalysisPanel(Panel):
             server, "Sheet", shipped_assets("runs"), SUFFIXES, folder, post, "From any laboratory or engine."
         )
         page.sheet.slot = self._filled
-        self._tables = page.tables
         gui.add_html(small_html(link_html(page.tables.publish(sheet_page(page.sheet, post)), FILL_IN)))
         self._response = gui.add_text("Response", "", hint="Column to analyse; empty where there is only one.")
         self._target = gui.add_text("Target", "", hint="Value that the response should have; empty: none.")
@@ -81,10 +80,6 @@ class AnalysisPanel(Panel):
     def set_dark(self, dark: bool) -> None:
         """Charts for a dark page, or a light one."""
         self.view.set_dark(dark)
-
-    def close(self) -> None:
-        """End the pages with tables."""
-        self._tables.close()
 
     def _analyse(self) -> None:
         factors = self._factors.chosen

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from explorer.study.edit import RANGE_KEYS, StudyEdits, edited_study, listed_edi
 from explorer.units import checked, number, observable_label, parameter_label, unit_of_observable, unit_of_parameter
 from explorer.viewer.actions import Action, Post
 from explorer.viewer.study.process_view import escaped
+from explorer.viewer.tables.ranges_page import Range, RangeRow
 from solver import parameters
 
 TARGET_WORDS = {"mean": "mean", "sd": "SD", "margin": "counts as met within ±"}
@@ -101,18 +103,41 @@ class OrderPanel:
         low, high, reference = (number_on_screen(unit.of(float(getattr(factor, key)))) for key in RANGE_KEYS)
         return low, high, reference
 
+    def ranges(self) -> list[RangeRow]:
+        """Every factor as it stands now, in the units of the screen."""
+        if self._study is None:
+            return []
+        return [
+            RangeRow(
+                one.name, parameter_label(one.path), unit_of_parameter(one.path).symbol, _shown(self._rows[one.name])
+            )
+            for one in self._study.factors
+        ]
+
+    def take_ranges(self, ranges: Mapping[str, Range]) -> None:
+        """Take low, high and measured value of factors, in the units of the screen; all of them, or none."""
+        changed = {name: self._changed(name, sent) for name, sent in ranges.items()}
+        self._ranges = {name: values for name, values in (self._ranges | changed).items() if values}
+        for name, sent in ranges.items():
+            self._rows[name].value = sent
+        self._tell()
+
     def _take_range(self, name: str) -> None:
-        """Read one row; what stands there as in the file is no change."""
+        """Read one row."""
+        self._ranges[name] = self._changed(name, self._rows[name].value)
+        self._tell()
+
+    def _changed(self, name: str, sent: Range) -> dict[str, float]:
+        """What of a range is otherwise than in the file; SI."""
         assert self._study is not None
         factor = next(one for one in self._study.factors if one.name == name)
         unit, declared = unit_of_parameter(factor.path), parameters(self._study.scene)[factor.path]
         changed = {}
-        for key, sent, before in zip(RANGE_KEYS, self._rows[name].value, self._in_file(factor), strict=True):
-            entered = checked(sent, unit.of(declared.low), unit.of(declared.high), f"{factor.name} {key}")
+        for key, value, before in zip(RANGE_KEYS, sent, self._in_file(factor), strict=True):
+            entered = checked(value, unit.of(declared.low), unit.of(declared.high), f"{factor.name} {key}")
             if number_on_screen(entered) != before:
                 changed[key] = min(max(entered * unit.size, declared.low), declared.high)
-        self._ranges[factor.name] = changed
-        self._tell()
+        return changed
 
     def _take_target(self) -> None:
         """Read the target."""
@@ -152,6 +177,11 @@ class OrderPanel:
         except ValueError as error:
             text += f"\n\n**This study cannot start:** {escaped(str(error))}"
         self._told.content = text
+
+
+def _shown(handle: Any) -> Range:
+    low, high, measured = handle.value
+    return float(low), float(high), float(measured)
 
 
 def edits_markdown(study: Study, edits: StudyEdits) -> str:

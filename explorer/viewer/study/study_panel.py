@@ -38,11 +38,15 @@ from explorer.viewer.study.process_view import (
 )
 from explorer.viewer.study.profiler_panel import ProfilerPanel
 from explorer.viewer.study.result_chooser import ResultChooser, title
+from explorer.viewer.tables.ranges_page import RangesInHand, ranges_page
+from explorer.viewer.tables.table_server import link_html
+from explorer.viewer.view import small_html
 from solver import Scene, canonical, parameters, with_values
 
 PRESENT = "present or newest study"
 NONE = "(the study cannot be read)"
 FROM_FILE = " From the study's file; photographs can take its place (*Laboratory*)."
+IN_A_TABLE = "All ranges in a table"
 PROFILED = "Move a slider: the charts follow."
 
 
@@ -71,6 +75,8 @@ class StudyPanel(Panel):
         self._targets, self._kept = () if loaded is None else loaded.targets, page.target
         self._target = gui.add_markdown("")
         with gui.add_folder("Ranges and target of the next study", expand_by_default=False):
+            in_hand = RangesInHand(lambda: self._order.ranges(), lambda ranges: self._order.take_ranges(ranges))
+            gui.add_html(small_html(link_html(page.tables.publish(ranges_page(in_hand, post)), IN_A_TABLE)))
             self._order = OrderPanel(server, study.study_file, loaded, post)
         self._place = PlaceChoice(server, page.place, "study", post)
         acts = orders(study, self._start, study.resume, self._queue) | {RETRY: study.retry}

@@ -316,6 +316,23 @@ def test_ranges_and_target_are_asked_for_as_entered(table):
     assert order._goal["mean"].value == 24.68
 
 
+def test_all_ranges_are_taken_from_a_table_or_none(table):
+    order = table.panel._order
+    rows = {row.name: row for row in order.ranges()}
+    assert (rows["X4"].label, rows["X4"].unit, rows["X4"].range) == ("shear modulus seed", "MPa", (40.1, 70.5, 56.3))
+    assert len(rows) == len(order._rows)
+    ranges = {name: row.range for name, row in rows.items()}
+    order.take_ranges(ranges)
+    assert not order.edits
+    with pytest.raises(ValueError, match="X7 low"):
+        order.take_ranges(ranges | {"X4": (30.0, 70.5, 56.3), "X7": (math.nan, 1.0, 1.0)})
+    assert not order.edits
+    order.take_ranges(ranges | {"X4": (30.0, 70.5, 56.3)})
+    assert dict(order.edits.factors) == {"X4": {"low": 30e6}}
+    assert order._rows["X4"].value == (30.0, 70.5, 56.3)
+    assert "| X4 low | 40.1 MPa | 30 MPa |" in order._told.content
+
+
 def test_every_factor_has_a_row_and_what_is_shown_as_in_the_file_is_no_change(table):
     order = table.panel._order
     assert len(order._rows) == len(load_study(str(table.study.study_file)).factors)

@@ -13,6 +13,7 @@ from explorer.errors import CommandError
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import token_cookie
 from explorer.viewer.shell.web_pages import WebPages
+from explorer.viewer.tables.ranges_page import RangeRow, entered_ranges
 from explorer.viewer.tables.sheet_page import column_definitions, filled_sheet, rows_of
 from explorer.viewer.tables.table_server import MISSING, TableGuard, TablePage, TableServer, done_by
 from solver.assets import asset_path
@@ -96,6 +97,31 @@ def test_without_the_extra_the_page_says_what_to_install(monkeypatch):
     pages.page(address)
     tables.close()
     assert MISSING.encode() in pages.page(address).body
+
+
+RANGES = [RangeRow("X4", "shear modulus seed", "MPa", (40.1, 70.5, 56.3)), RangeRow("X7", "restitution", "", (0, 1, 1))]
+
+
+def test_ranges_are_read_with_a_comma_or_a_point_in_any_order():
+    sent = [
+        {"name": "X7", "low": "0,5", "high": 1, "measured": "0.75"},
+        {"name": "X4", "low": "40.1", "high": "70,5", "measured": " 56.3 "},
+    ]
+    assert entered_ranges(RANGES, sent) == {"X4": (40.1, 70.5, 56.3), "X7": (0.5, 1.0, 0.75)}
+
+
+@pytest.mark.parametrize(
+    ("sent", "words"),
+    [
+        ([{"name": "X4", "low": "soft", "high": "1", "measured": "1"}], "X4, low: 'soft' is not a number"),
+        ([{"name": "X4", "low": None, "high": "1", "measured": "1"}], "X4, low: 'None' is not a number"),
+        ([{"name": "X4", "low": "nan", "high": "1", "measured": "1"}], "X4, low: 'nan' is not a number"),
+        ([{"name": "X7"}, "X4"], "X4: is not in the table any more"),
+    ],
+)
+def test_ranges_that_are_no_numbers_are_refused(sent, words):
+    with pytest.raises(CommandError, match=words):
+        entered_ranges(RANGES, sent)
 
 
 SHEET = """# factor | a | 0 | 1 | m

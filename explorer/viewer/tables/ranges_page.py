@@ -1,0 +1,103 @@
+"""The ranges of all factors of the next study in one table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from doe.table_file import CellTable
+from explorer.errors import CommandError
+from explorer.viewer.actions import Post
+from explorer.viewer.tables.table_server import TablePage, done_by
+
+TITLE = "Ranges of the next study"
+HOW = (
+    "Change the blue columns; a click on a head sorts, the sign in it filters. Decimal points or commas. Save, and the "
+    "next study starts from these ranges."
+)
+SAVED = "Saved: the next study starts from these ranges."
+WRITTEN = {"low": "Low", "high": "High", "measured": "Measured value"}
+Range = tuple[float, float, float]
+"""Low, high and measured value, in the unit that is shown."""
+NUMBERS = CellTable((), (), decimal_comma=True)
+"""Reads a number with a decimal comma, or with a point."""
+
+
+@dataclass(frozen=True)
+class RangeRow:
+    """One factor: its short name, its parameter in words, its unit and its range."""
+
+    name: str
+    label: str
+    unit: str
+    range: Range
+
+
+@dataclass(frozen=True)
+class RangesInHand:
+    """The ranges that the next study starts from, and who takes others, by the factors' names."""
+
+    rows: Callable[[], Sequence[RangeRow]]
+    take: Callable[[Mapping[str, Range]], None]
+
+
+def ranges_page(in_hand: RangesInHand, post: Post) -> TablePage:
+    """The page on which the ranges in hand are changed."""
+    return TablePage("ranges", TITLE, lambda: _build(in_hand, post))
+
+
+def _build(in_hand: RangesInHand, post: Post) -> None:
+    from nicegui import ui
+
+    rows = in_hand.rows()
+    ui.label(TITLE).classes("text-h6").props("role=heading aria-level=1")
+    ui.label(HOW)
+    columns: list[dict[str, object]] = [
+        {"headerName": head, "field": name, "sortable": True, "filter": "agTextColumnFilter", "flex": flex}
+        for name, head, flex in (("name", "Factor", 1), ("label", "Parameter", 4), ("unit", "Unit", 1))
+    ]
+    columns += [
+        {"headerName": head, "field": name, "editable": True, "cellDataType": "text", "flex": 1}
+        | {"cellStyle": {"background": "rgba(31,110,165,0.08)"}}
+        for name, head in WRITTEN.items()
+    ]
+    grid = ui.aggrid(
+        {"columnDefs": columns, "rowData": [_cells(row) for row in rows], "stopEditingWhenCellsLoseFocus": True}
+    ).style("height: calc(100vh - 12rem)")
+    told = ui.label("").props("role=status")
+
+    async def save() -> None:
+        try:
+            ranges = entered_ranges(rows, await grid.get_client_data())
+        except CommandError as error:
+            told.text = str(error)
+            return
+        told.text = await done_by(post, lambda: in_hand.take(ranges)) or SAVED
+
+    ui.button("Save", on_click=save).props("no-caps")
+
+
+def _cells(row: RangeRow) -> dict[str, str]:
+    values = zip(WRITTEN, row.range, strict=True)
+    return {"name": row.name, "label": row.label, "unit": row.unit} | {key: f"{value:.6g}" for key, value in values}
+
+
+def entered_ranges(rows: Sequence[RangeRow], sent: Sequence[object]) -> dict[str, Range]:
+    """The ranges that a browser ``sent`` for ``rows``. Raises CommandError for what is no number."""
+    found = {str(row.get("name")): row for row in sent if isinstance(row, Mapping)}
+    ranges: dict[str, Range] = {}
+    for row in rows:
+        cells = found.get(row.name)
+        if cells is None:
+            raise CommandError(f"{row.name}: is not in the table any more; open it again")
+        low, high, measured = (_number(row.name, head, cells.get(key)) for key, head in WRITTEN.items())
+        ranges[row.name] = (low, high, measured)
+    return ranges
+
+
+def _number(factor: str, head: str, cell: object) -> float:
+    value = NUMBERS.number("" if cell is None else str(cell).strip())
+    if math.isnan(value):
+        raise CommandError(f"{factor}, {head.lower()}: {str(cell)[:40]!r} is not a number")
+    return value
