@@ -19,6 +19,7 @@ from doe.run_records import FloatArray, Run, Runner, Setting, no_pile_shares, re
 from doe.stages.stage import Chain, Stage, ended
 from doe.studies.profile import Profile
 from doe.studies.study import CALIBRATED, Factor, Study
+from doe.target import Target
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,21 +147,27 @@ def _smallest_main_effect(model: Surface) -> float:
 
 def optimum(study: Study, fitted: SurfaceResult) -> OptimumResult:
     """The setting on the solution surface nearest the measured values, or the best compromise of several targets."""
-    reference = np.array([float(factor.reference) for factor in fitted.factors])
-    target = study.targets[0]
-    error = target.standard_error
-    single = find_optimum(fitted.models[0], target.mean, reference, seed=study.seed, target_standard_error=error)
+    return optimum_of(fitted.models, fitted.factors, study.targets, study.seed)
+
+
+def optimum_of(
+    models: tuple[Surface, ...], factors: tuple[Factor, ...], targets: tuple[Target, ...], seed: int
+) -> OptimumResult:
+    """The same by the models of the targets; ``seed``: of the refits that tell how far it scatters."""
+    reference = np.array([float(factor.reference) for factor in factors])
+    target = targets[0]
+    single = find_optimum(models[0], target.mean, reference, seed=seed, target_standard_error=target.standard_error)
     compromise = None
     point = single.point
-    if len(study.targets) > 1:
-        compromise = find_compromise(fitted.models, study.targets, reference)
+    if len(targets) > 1:
+        compromise = find_compromise(models, targets, reference)
         point = compromise.point
     return OptimumResult(
-        values={f.path: float(v) for f, v in zip(fitted.factors, point, strict=True)},
-        factors=fitted.factors,
+        values={f.path: float(v) for f, v in zip(factors, point, strict=True)},
+        factors=factors,
         single=single,
         compromise=compromise,
-        posterior=joint_posterior(fitted.models, study.targets),
+        posterior=joint_posterior(models, targets),
     )
 
 

@@ -8,7 +8,9 @@ import time
 import pytest
 
 from tests.browser.served import served
+from tests.browser.test_design_page import write_into
 from tests.browser.test_page import BEGUN, FLAGS, PATIENCE, SETTINGS, positions, room, slider, wait_for
+from tests.browser.test_photographed_target import shot
 from tests.explorer import reported_studies
 
 pytestmark = pytest.mark.browser
@@ -128,6 +130,22 @@ def test_a_slider_of_the_profiler_moves_its_chart_by_keyboard(page):
     page.keyboard.press("End")
     wait_for(lambda: page.evaluate(HERE)[0] > first[0])
     assert page.evaluate(HERE)[1:] == first[1:]
+
+
+def test_a_run_is_left_out_in_a_table_and_the_board_says_both_answers(page):
+    with page.expect_popup() as popped:
+        page.get_by_role("link", name="Leave runs of the surface out").click()
+    table = popped.value
+    table.set_default_timeout(PATIENCE)
+    cell = table.locator("[role=row][row-index='0'] [role=gridcell]").last
+    write_into(table, cell, "wedged in the outlet")
+    table.get_by_role("button", name="Save").click()
+    table.get_by_role("status").filter(has_text="Saved").wait_for()
+    shot(table, "runs_table")
+    table.close()
+    frame = board(page, "Study")
+    frame.get_by_text("Parameters without these runs").wait_for()
+    frame.get_by_role("cell", name="wedged in the outlet").wait_for()
 
 
 def test_a_study_is_started_paused_cancelled_and_resumed(page, address, data):

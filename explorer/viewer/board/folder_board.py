@@ -12,6 +12,7 @@ from explorer.diagnosis.process import RESULT as DIAGNOSIS
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.errors import CommandError
 from explorer.project.project import REPORT
+from explorer.study.excluded_runs import load_excluded
 from explorer.study.process import PARTIAL
 from explorer.study.process import RESULT as STUDY
 from explorer.viewer.board.board import board_json
@@ -49,7 +50,11 @@ class FolderBoard:
                 board = diagnosis_board(DiagnosisResult.from_dict(diagnosis), None, report)
             else:
                 board = study_board(
-                    None if study is None else study_from(study), None, report, photographed_of(self._folder)
+                    None if study is None else study_from(study),
+                    None,
+                    report,
+                    photographed_of(self._folder),
+                    load_excluded(self._folder),
                 )
         except RecordError as error:
             raise CommandError(f"{self._folder}: {error}") from None

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
+from doe.errors import StatisticsError
 from doe.run_records import Run
+from doe.studies.exclusion import ExcludedRun, optimum_without
 from doe.studies.study_result import AnyStudy, PartialStudy, StudyResult
 from doe.target import experiment_of
 from explorer.background.command_process import CommandStatus
@@ -30,10 +33,11 @@ def study_board(
     status: CommandStatus | None,
     report: str = "",
     photographed: PhotographedTarget | None = None,
+    excluded: Sequence[ExcludedRun] = (),
 ) -> Board:
     """The board of ``result``; ``status`` of the process that works on it, None where none does.
 
-    ``photographed``: the photographs that it was calibrated against.
+    ``photographed``: the photographs that it was calibrated against; ``excluded``: runs that a person leaves out.
     """
     alive = status is not None and status.alive
     so_far = (result.partial or "", result.line) if isinstance(result, PartialStudy) else ("", "")
@@ -47,7 +51,7 @@ def study_board(
         stages=() if finished else stages_of(status, so_far),
         charts=made_charts(_beside_photographs(result, photographed))
         + made_charts(study_plots(result))[:: -1 if finished else 1],
-        tables=(*_answers(result), _runs(result)),
+        tables=(*_answers(result), *_without(result, excluded), _runs(result)),
         report=report,
     )
 
@@ -105,6 +109,26 @@ def _answers(result: AnyStudy) -> tuple[BoardTable, ...]:
     caption = "Where a factor is not identified, the range that gives the target is the answer."
     table = Table(("Factor", "Parameter", "Answer", "Identified"), rows, caption)
     return (BoardTable("Parameters", table, folded=False),)
+
+
+def _without(result: AnyStudy, excluded: Sequence[ExcludedRun]) -> tuple[BoardTable, ...]:
+    """What the study would have answered without runs that are left out, and why they are."""
+    if not isinstance(result, StudyResult) or not excluded:
+        return ()
+    why = Table(("Run left out", "Seed", "Because"), tuple((one.label, str(one.seed), one.reason) for one in excluded))
+    reasons = BoardTable("Runs left out", why, folded=False)
+    try:
+        left = settings(optimum_without(result, excluded))
+    except StatisticsError as error:
+        text = Table(("Without them",), ((f"no model: {error}",),))
+        return (BoardTable("Parameters without these runs", text, folded=False), reasons)
+    rows = tuple(
+        (one.name, one.label, *(each.chosen if each.identified else each.answer for each in (one, other)))
+        for one, other in zip(settings(result.optimum), left, strict=True)
+    )
+    caption = "The surface is fitted anew; its factors, its region and the verification are those of all runs."
+    table = Table(("Factor", "Parameter", "All runs", "Without"), rows, caption)
+    return (BoardTable("Parameters without these runs", table, folded=False), reasons)
 
 
 def listed_runs(result: AnyStudy) -> list[tuple[str, Run]]:

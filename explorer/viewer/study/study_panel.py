@@ -8,6 +8,7 @@ from pathlib import Path
 from doe.record import RecordError
 from doe.stages import planned_runs
 from doe.store import default_store
+from doe.studies.exclusion import ExcludedRun
 from doe.studies.study import Study, load_study
 from doe.studies.study_result import AnyStudy, StudyResult, study_from
 from doe.target import Target
@@ -17,6 +18,7 @@ from explorer.errors import CommandError
 from explorer.photograph.target import PhotographedTarget
 from explorer.session import Session
 from explorer.study.duration import duration_text
+from explorer.study.excluded_runs import keep_excluded, load_excluded
 from explorer.study.process import PARTIAL, RESULT, QueuedStudy
 from explorer.study.runs import scene_of
 from explorer.units import observable_label, observed
@@ -39,6 +41,7 @@ from explorer.viewer.study.process_view import (
 from explorer.viewer.study.profiler_panel import ProfilerPanel
 from explorer.viewer.study.result_chooser import ResultChooser, title
 from explorer.viewer.tables.ranges_page import RangesInHand, ranges_page
+from explorer.viewer.tables.runs_page import RunsInHand, runs_page
 from explorer.viewer.tables.table_server import link_html
 from explorer.viewer.view import small_html
 from solver import Scene, canonical, parameters, with_values
@@ -46,6 +49,7 @@ from solver import Scene, canonical, parameters, with_values
 PRESENT = "present or newest study"
 NONE = "(the study cannot be read)"
 FROM_FILE = " From the study's file; photographs can take its place (*Laboratory*)."
+LEAVE_OUT = "Leave runs of the surface out"
 IN_A_TABLE = "All ranges in a table"
 PROFILED = "Move a slider: the charts follow."
 
@@ -85,6 +89,9 @@ class StudyPanel(Panel):
             self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
         self._recording = PileRecording(page, self._record_order)
         self._recording.offer(False)
+        self._left_out: tuple[ExcludedRun, ...] = ()
+        shown = RunsInHand(self._finished, lambda: self._left_out, self._leave_out)
+        gui.add_html(small_html(link_html(page.tables.publish(runs_page(shown, post)), LEAVE_OUT)))
         self._channel = page.channel
         self._board = BoardView(server, page.pages, "/study/page.json", "Study")
         self._channel.offer("open_run", lambda asked: post(lambda: self._open_run(asked)))
@@ -158,8 +165,9 @@ class StudyPanel(Panel):
         self._shown, self._trouble = shown, ""
         try:
             result = None if content is None else study_from(content)
+            self._left_out = () if folder is None else load_excluded(folder)
             self._show_result(result, "" if folder is None else title(folder), shown)
-        except RecordError as error:
+        except (RecordError, CommandError) as error:
             # A folder that somebody named may hold any JSON, also that of another version.
             self._trouble = f"{folder}: cannot be shown ({error})"
             self._show_result(None, "", None)
@@ -176,12 +184,24 @@ class StudyPanel(Panel):
         chosen, result = self._chooser.folder, self._result
         status = self._study.status() if chosen is None else None
         folder = chosen or self._present()
+        left_out = self._left_out
         self._board.show(
-            self._shown,
+            (self._shown, left_out),
             folder,
             status,
-            lambda status, report: study_board(result, status, report, photographed_of(folder)),
+            lambda status, report: study_board(result, status, report, photographed_of(folder), left_out),
         )
+
+    def _finished(self) -> StudyResult | None:
+        return self._result if isinstance(self._result, StudyResult) else None
+
+    def _leave_out(self, result: StudyResult, excluded: Sequence[ExcludedRun]) -> None:
+        """Leave runs of ``result`` out, which must be the one that is shown."""
+        folder = self._chooser.folder or self._present()
+        if result is not self._result or folder is None:
+            raise CommandError("another study is shown by now; open the table again")
+        keep_excluded(folder, result, excluded)
+        self._left_out = tuple(excluded)
 
     def _open_run(self, asked: Mapping[str, object]) -> None:
         """Pour a run of the result in the scene, as its row of the board asks."""

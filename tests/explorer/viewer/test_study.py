@@ -8,13 +8,16 @@ import plotly.io
 import pytest
 
 from doe.stages import planned_runs
+from doe.studies.exclusion import ExcludedRun
 from doe.studies.study import load_study
 from doe.studies.study_result import study_from
 from explorer.background.command_process import HERE, CommandStatus, PourPlace
 from explorer.background.progress import StageProgress, TriedRun
+from explorer.errors import CommandError
 from explorer.report.sections.answer import banner as study_banner
 from explorer.report.study_charts import Plot
 from explorer.study.edit import StudyEdits
+from explorer.study.excluded_runs import load_excluded
 from explorer.study.process import QueuedStudy
 from explorer.viewer.actions import Actions
 from explorer.viewer.panel import Now
@@ -287,6 +290,22 @@ def test_a_study_that_runs_shows_what_it_has(table, result, tmp_path):
     written(tmp_path / "study-1", result)
     table.study.now = CommandStatus("finished")
     assert "Ascent path" in [chart["title"] for chart in table.board()["charts"]]
+
+
+def test_runs_are_left_out_of_the_study_that_is_shown(table, result, tmp_path):
+    folder = written(tmp_path / "study-1", result)
+    table.study.out, table.study.now = folder, CommandStatus("finished")
+    table.show()
+    shown = table.panel._finished()
+    run = shown.surface.runs[0][0]
+    excluded = [ExcludedRun(run.label, run.experiment, run.seed, "wedged")]
+    table.panel._leave_out(shown, excluded)
+    assert load_excluded(folder) == tuple(excluded)
+    told = {one["title"]: one["rows"] for one in table.board()["tables"]}
+    assert told["Runs left out"] == [[run.label, str(run.seed), "wedged"]]
+    with pytest.raises(CommandError, match="another study is shown by now"):
+        table.panel._leave_out(replace(shown), excluded)
+    assert table.panel._left_out == tuple(excluded)
 
 
 def test_ranges_and_target_are_asked_for_as_entered(table):
