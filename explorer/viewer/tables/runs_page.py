@@ -54,7 +54,7 @@ def _build(in_hand: RunsInHand, post: Post) -> None:
         ui.label(str(error)).props("role=alert")
         return
     columns = [
-        {"headerName": head, "field": name, "sortable": True, "filter": "agTextColumnFilter", "minWidth": 100}
+        {"headerName": head, "field": name, "sortable": True, "filter": "agTextColumnFilter", "minWidth": 95, "flex": 1}
         | {"wrapHeaderText": True, "autoHeaderHeight": True}
         for name, head in _heads(result).items()
     ]

@@ -29,14 +29,21 @@ def viewer(tmp_path):
     port, path = free_port("127.0.0.1", 0), tmp_path / "arrived.rrd"
     program = Path(sys.executable).with_name("rerun")
     command = [str(program), "--save", str(path), "--port", str(port), "--bind", "127.0.0.1"]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    # A shell's background job ignores Ctrl-C, and so would what it starts.
+    process = subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, preexec_fn=listens_to_ctrl_c
+    )
     yield f"rerun+http://127.0.0.1:{port}/proxy", path, process
     process.kill()
     process.wait(120)
 
 
+def listens_to_ctrl_c():
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def interrupted(process):
-    """Ctrl-C until it ends: once, one was not heard."""
+    """Ctrl-C until it ends: one that comes while Python starts is lost."""
     end = time.monotonic() + PATIENCE
     while process.poll() is None:
         assert time.monotonic() < end, "it does not end"
