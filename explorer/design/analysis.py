@@ -154,6 +154,7 @@ def _refuse_surrogate(runs: Runs, order: AnalyseOrder) -> None:
 
 
 def _result(runs: Runs, order: AnalyseOrder, analysis: DesignAnalysis) -> DesignResult:
+    left_out = [f"Run {label} is left out, as the sheet says: {short(why)}." for label, why in runs.excluded]
     return DesignResult(
         sheet=order.sheet,
         design=runs.design,
@@ -163,7 +164,7 @@ def _result(runs: Runs, order: AnalyseOrder, analysis: DesignAnalysis) -> Design
         factors=_factors(runs),
         coded=runs.coded,
         target=order.target,
-        analysis=analysis,
+        analysis=replace(analysis, notes=(*left_out, *analysis.notes)),
         command=_command(order),
         versions=versions(),
         about=made_today(order.author, order.notes),
@@ -297,8 +298,7 @@ def _refuse_dependent(runs: Runs, region: Region, sheet: str) -> None:
 def _run_notes(runs: Runs, region: Region, found: DesignAnalysis) -> list[str]:
     """What single runs ask for: levels far outside a factor's range, and runs without which there is no model."""
     row, replicate = np.nonzero(~np.isnan(runs.responses))
-    labels = _labels(runs)
-    notes = [f"Run {label} is left out, as the sheet says: {short(why)}." for label, why in runs.excluded]
+    labels, notes = _labels(runs), []
     for factor in runs.factors:
         if factor.levels and found.named is None and len(factor.levels) == 2:
             notes.append(f"{factor.name}: −1 is {factor.levels[0]}, +1 is {factor.levels[1]}.")

@@ -35,6 +35,8 @@ Array = npt.NDArray[np.float64]
 
 EMPTY_CELLS = ("", "NA", "-", "–")
 MOST_BYTES = 10_000_000
+FLAGS = ("yes", "no", "true", "false", "y", "n", "x")
+"""What other programs write where they ask whether a run is left out, and not why."""
 HEADER_CELL = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<unit>[^\]]*)\])?$")
 WORDS = re.compile(r"[^<>&\"'`\x00-\x1f]{0,60}")
 SNAP = 1e-6
@@ -81,9 +83,16 @@ class Sheet:
         return value
 
     def why_excluded(self, position: int) -> str:
-        """Why a run is left out; empty where it is not."""
+        """Why a run is left out; empty where it is not. Raises CommandError for a number or a yes."""
         text = self.cells[position][self.columns[EXCLUDED]] if EXCLUDED in self.columns else ""
-        return "" if text in EMPTY_CELLS else text
+        if text in EMPTY_CELLS:
+            return ""
+        if text.lower() in FLAGS or not math.isnan(self.table.number(text)):
+            raise CommandError(
+                f"{self.path}, line {self.lines[position]}, column {EXCLUDED}: {short(text)} is no reason; "
+                "allowed: words that say why the run is left out, or an empty cell"
+            )
+        return text
 
     def level(self, position: int, factor: DesignFactor) -> float:
         """The level of a factor, for names their coded value; NaN where the cell is empty."""

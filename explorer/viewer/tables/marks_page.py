@@ -8,14 +8,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from PIL import Image, ImageOps
+import numpy as np
+from PIL import Image
 
 from explorer.errors import CommandError
 from explorer.photograph.marks import UNMARKED, Marks, Point, base_line_through, known_length
 from explorer.viewer.actions import Post
 from explorer.viewer.tables.table_server import TablePage, done_by
 from solver.assets import asset_path
-from solver.photograph import open_picture
+from solver.photograph import Picture, open_picture
 
 if TYPE_CHECKING:
     from nicegui.events import MouseEventArguments
@@ -42,13 +43,19 @@ class PhotographInHand:
 
 @dataclass
 class Clicks:
-    """Points that were clicked in a picture of ``width`` [px], by what they mark; two of each at most."""
+    """Points of a picture of ``width`` [px] that were clicked, by what they mark; two of each at most.
+
+    ``across``, ``down``: pixels of the picture in one of what is shown.
+    """
 
     width: int
+    across: float = 1.0
+    down: float = 1.0
     points: dict[str, list[Point]] = field(default_factory=lambda: {BASE: [], LENGTH: []})
 
-    def add(self, what: str, point: Point) -> None:
-        """One more; the third begins anew."""
+    def add(self, what: str, x: float, y: float) -> None:
+        """One more, from the top left corner of what is shown; the third begins anew."""
+        point = (x * self.across - 0.5, y * self.down - 0.5)
         before = self.points[what]
         self.points[what] = [point] if len(before) == 2 else [*before, point]
 
@@ -64,11 +71,11 @@ class Clicks:
             marks = replace(marks, base_line=base_line_through(base[0], base[1], self.width))
         return marks
 
-    def drawn(self, scale: float) -> str:
-        """The points and the lines between them as SVG of the picture that is shown, ``scale`` times the size."""
+    def drawn(self) -> str:
+        """The points and the lines between them as SVG of the picture that is shown."""
         shapes = []
         for what, points in self.points.items():
-            places = [((x + 0.5) * scale, (y + 0.5) * scale) for x, y in points]
+            places = [((x + 0.5) / self.across, (y + 0.5) / self.down) for x, y in points]
             style = f'stroke="{COLOURS[what]}" stroke-width="2" fill="none"'
             shapes += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="6" {style} />' for x, y in places]
             if len(places) == 2:
@@ -88,13 +95,10 @@ def _build(in_hand: PhotographInHand, post: Post) -> None:
     photo = in_hand.chosen()
     try:
         path = asset_path("photographs", photo)
-        width = open_picture(path).width
-        address, shown = _as_shown(path.read_bytes())
+        address, clicks = shown_picture(open_picture(path))
     except (ValueError, OSError) as error:
         ui.label(str(error)).props("role=alert")
         return
-    scale = shown / width
-    clicks = Clicks(width)
     ui.label(f"{TITLE}: {path.name}").classes("text-h6").props("role=heading aria-level=1")
     ui.label(HOW)
     with ui.row().classes("items-center"):
@@ -102,8 +106,8 @@ def _build(in_hand: PhotographInHand, post: Post) -> None:
         length = ui.number(f"{LENGTH} [mm]", min=0.0, step=0.1)
 
     def clicked(event: MouseEventArguments) -> None:
-        clicks.add(what.value, (event.image_x / scale - 0.5, event.image_y / scale - 0.5))
-        picture.content = clicks.drawn(scale)
+        clicks.add(what.value, event.image_x, event.image_y)
+        picture.content = clicks.drawn()
 
     picture = ui.interactive_image(address, on_mouse=clicked, events=["mousedown"], cross=True)
     picture.style("max-height: calc(100vh - 17rem)")
@@ -120,11 +124,12 @@ def _build(in_hand: PhotographInHand, post: Post) -> None:
     ui.button("Use these marks", on_click=use).props("no-caps")
 
 
-def _as_shown(content: bytes) -> tuple[str, int]:
-    """A photograph as it is seen, no larger than is shown, as the address of an image; and its width [px]."""
-    with Image.open(io.BytesIO(content)) as opened:
-        seen = ImageOps.exif_transpose(opened).convert("RGB")
-    seen.thumbnail((MOST_SHOWN, MOST_SHOWN))
+def shown_picture(picture: Picture) -> tuple[str, Clicks]:
+    """A photograph as the program sees it, no larger than is shown, as the address of an image; and clicks in it."""
+    shown = Image.fromarray(np.clip(np.rint(picture.grey), 0, 255).astype(np.uint8))
+    across, down = shown.width * picture.reduced, shown.height * picture.reduced
+    shown.thumbnail((MOST_SHOWN, MOST_SHOWN))
     file = io.BytesIO()
-    seen.save(file, "JPEG", quality=90)
-    return "data:image/jpeg;base64," + base64.b64encode(file.getvalue()).decode(), seen.width
+    shown.save(file, "JPEG", quality=90)
+    address = "data:image/jpeg;base64," + base64.b64encode(file.getvalue()).decode()
+    return address, Clicks(picture.width, across / shown.width, down / shown.height)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from doe.table_file import CellTable
 from explorer.errors import CommandError
 from explorer.viewer.actions import Post
-from explorer.viewer.tables.table_server import TablePage, done_by
+from explorer.viewer.tables.table_server import LOST, REPLY, TablePage, done_by
 
 TITLE = "Ranges of the next study"
 HOW = (
@@ -69,9 +69,9 @@ def _build(in_hand: RangesInHand, post: Post) -> None:
 
     async def save() -> None:
         try:
-            ranges = entered_ranges(rows, await grid.get_client_data())
-        except CommandError as error:
-            told.text = str(error)
+            ranges = entered_ranges(rows, await grid.get_client_data(timeout=REPLY))
+        except (CommandError, TimeoutError) as error:
+            told.text = str(error) or LOST
             return
         told.text = await done_by(post, lambda: in_hand.take(ranges)) or SAVED
 

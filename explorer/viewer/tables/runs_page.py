@@ -12,7 +12,7 @@ from explorer.errors import CommandError
 from explorer.outcomes import outcome_text
 from explorer.units import MISSING, number, observable_label, observed, unit_of_parameter
 from explorer.viewer.actions import Post
-from explorer.viewer.tables.table_server import TablePage, done_by
+from explorer.viewer.tables.table_server import LOST, REPLY, TablePage, done_by
 
 TITLE = "Runs of the response surface"
 HOW = (
@@ -70,9 +70,9 @@ def _build(in_hand: RunsInHand, post: Post) -> None:
 
     async def save() -> None:
         try:
-            excluded = excluded_runs(result, await grid.get_client_data())
-        except CommandError as error:
-            told.text = str(error)
+            excluded = excluded_runs(result, await grid.get_client_data(timeout=REPLY))
+        except (CommandError, TimeoutError) as error:
+            told.text = str(error) or LOST
             return
         told.text = await done_by(post, lambda: in_hand.take(result, excluded)) or SAVED
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,13 +16,17 @@ from explorer.design.filled_sheet import EMPTY_CELLS, Sheet, read_sheet, short
 from explorer.errors import CommandError
 from explorer.viewer.actions import Post
 from explorer.viewer.laboratory.inputs import UploadSlot
-from explorer.viewer.tables.table_server import TablePage, done_by
+from explorer.viewer.tables.table_server import LOST, REPLY, TablePage, done_by
 from solver.assets import asset_path
 
 TITLE = "Sheet of runs"
 SAVED_AS = "_filled"
 """Behind the name of a sheet, in that of what was filled in."""
+KEPT_NAME = re.compile(rf"({SAVED_AS})?(-[0-9a-f]{{12}})?$")
+"""What was put behind the name of a sheet when it was kept."""
 LONGEST_REASON = 200
+MOST_CELLS = 20_000
+"""More do not fit into one message of a browser."""
 HOW = (
     "Enter the results in the blue columns; a click on a head sorts, the sign in it filters. A run with a reason under "
     "excluded is left out of the analysis, which says so. Save, and the sheet is chosen under Filled sheet → model and "
@@ -59,7 +64,9 @@ def _build(in_hand: SheetInHand, post: Post) -> None:
 
     try:
         sheet = read_sheet(in_hand.path)
-    except (CommandError, ValueError) as error:
+        if (cells := len(sheet.cells) * len(_columns(sheet))) > MOST_CELLS:
+            raise CommandError(f"{sheet.path.name}: {cells} cells; allowed here: {MOST_CELLS}; fill in the file itself")
+    except ValueError as error:
         ui.label(str(error)).props("role=alert")
         return
     ui.label(f"{TITLE}: {sheet.path.name}").classes("text-h6").props("role=heading aria-level=1")
@@ -75,11 +82,10 @@ def _build(in_hand: SheetInHand, post: Post) -> None:
     told = ui.label("").props("role=status")
 
     async def save() -> None:
-        rows = await grid.get_client_data()
         try:
-            name, content = filled_sheet(sheet, rows)
-        except CommandError as error:
-            told.text = str(error)
+            name, content = filled_sheet(sheet, await grid.get_client_data(timeout=REPLY))
+        except (CommandError, TimeoutError) as error:
+            told.text = str(error) or LOST
             return
         told.text = await done_by(post, lambda: in_hand.take(name, content)) or SAVED.format(name)
 
@@ -134,22 +140,27 @@ def filled_sheet(sheet: Sheet, rows: Sequence[Mapping[str, object]]) -> tuple[st
     if sorted(sent) != sorted(map(str, sheet.lines)):
         raise CommandError(f"{sheet.path.name}: these are not its rows; open the table again")
     columns, written = _columns(sheet), editable(sheet)
-    table = []
-    for line, cells in zip(sheet.lines, sheet.cells, strict=True):
-        row = [*cells, *[""] * (len(columns) - len(cells))]
-        for name in written:
-            place = columns.index(name)
-            row[place] = _entered(sheet, line, name, sent[str(line)].get(str(place)), row[place])
-        table.append(row)
+    table = [[*cells, *[""] * (len(columns) - len(cells))] for cells in sheet.cells]
+    for name in written:
+        place = columns.index(name)
+        before = [row[place] for row in table]
+        now = [
+            _entered(line, name, sent[str(line)].get(str(place)), cell)
+            for line, cell in zip(sheet.lines, before, strict=True)
+        ]
+        if name != EXCLUDED and not _mixed(sheet, before):
+            _check_column(sheet, name, now)
+        for row, cell in zip(table, now, strict=True):
+            row[place] = cell
     header = [f"{name} [{sheet.units[name]}]" if sheet.units.get(name) else name for name in columns]
     text = io.StringIO()
     text.writelines(f"{comment}\n" for _, comment in sheet.table.comments)
     csv.writer(text, delimiter=";" if sheet.table.decimal_comma else ",", lineterminator="\n").writerows(
         [header, *table]
     )
-    stem = sheet.path.stem.removesuffix(SAVED_AS)
+    stem = KEPT_NAME.sub("", sheet.path.stem)
     content = text.getvalue().encode("utf-8-sig")  # by the mark spreadsheets know it
-    _check(content)
+    _check(content, [tuple(row) for row in table])
     return f"{stem}{SAVED_AS}.csv", content
 
 
@@ -161,21 +172,40 @@ def _columns(sheet: Sheet) -> list[str]:
     return names if EXCLUDED in names else [*names, EXCLUDED]
 
 
-def _entered(sheet: Sheet, line: int, name: str, value: object, before: str) -> str:
-    """A cell as it was entered; a number where the column holds numbers."""
-    text = " ".join(str("" if value is None else value).split())
+def _entered(line: int, name: str, value: object, before: str) -> str:
+    """A cell as it was entered, in one line; as it was where nobody has changed it."""
+    text = str("" if value is None else value)
+    if text == before:
+        return before
+    text = " ".join(text.split())
     if len(text) > LONGEST_REASON:
         raise CommandError(f"line {line}, {name}: {len(text)} characters; allowed: up to {LONGEST_REASON}")
-    if name == EXCLUDED or text == before or text in EMPTY_CELLS or sheet.is_words(name):
-        return text
-    if math.isnan(sheet.table.number(text)):
-        raise CommandError(f"line {line}, {name}: {short(text)} is not a number; allowed: a number, or nothing")
     return text
 
 
-def _check(content: bytes) -> None:
-    """Whether what is written is read again; raises CommandError where it is not."""
+def _numbers(sheet: Sheet, cells: Sequence[str]) -> list[bool]:
+    """Of each cell that is not empty, whether it is a number."""
+    return [not math.isnan(sheet.table.number(cell)) for cell in cells if cell not in EMPTY_CELLS]
+
+
+def _mixed(sheet: Sheet, cells: Sequence[str]) -> bool:
+    return len(set(_numbers(sheet, cells))) == 2
+
+
+def _check_column(sheet: Sheet, name: str, cells: Sequence[str]) -> None:
+    """Refuse a word among numbers; a column may be words as a whole."""
+    if not _mixed(sheet, cells):
+        return
+    for line, cell in zip(sheet.lines, cells, strict=True):
+        if cell not in EMPTY_CELLS and math.isnan(sheet.table.number(cell)):
+            raise CommandError(f"line {line}, {name}: {short(cell)} is not a number; allowed: a number, or nothing")
+
+
+def _check(content: bytes, table: Sequence[tuple[str, ...]]) -> None:
+    """Whether what is written is read as it was meant; raises CommandError where it is not."""
     with tempfile.TemporaryDirectory() as apart:
         path = Path(apart) / "sheet.csv"
         path.write_bytes(content)
-        read_sheet(path)
+        again = read_sheet(path).cells
+    if again != tuple(table):
+        raise CommandError("a cell cannot be written as CSV; allowed: none that begins a row with #")

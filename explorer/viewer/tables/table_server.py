@@ -9,6 +9,7 @@ cookie a browser sends to every port of a host. What a person does there is post
 from __future__ import annotations
 
 import asyncio
+import socket
 import threading
 from collections.abc import Awaitable, Callable, MutableMapping
 from concurrent.futures import Future
@@ -19,14 +20,15 @@ from http import HTTPStatus
 from typing import Any
 
 from explorer.viewer.actions import Post
-from explorer.viewer.guarded_server import allowed_hosts, free_port, has_cookie, token_cookie
+from explorer.viewer.guarded_server import allowed_hosts, has_cookie, token_cookie
 from explorer.viewer.shell.web_pages import GUARD, HTML, WebPage, WebPages
 
 HOST = "127.0.0.1"
 ADDRESS = "/tables/"
 """On the page's own port; each address there leads to the page of the same name on the other."""
 MISSING = "Tables need NiceGUI, which is not installed: pip install 'repose-explorer[tables]', and start again."
-ELSEWHERE = "Tables open on the machine only on which the program runs; take the file along instead."
+ELSEWHERE = "Tables open on the machine of the program only, at 127.0.0.1 or localhost; take the file along instead."
+FAILED = "Tables cannot be served ({}); start the program again."
 LOADING = "The tables are being loaded …"
 MOST_CONNECTIONS, MOST_MESSAGE_BYTES = 64, 4_000_000
 FAREWELL = 2.0
@@ -34,9 +36,11 @@ FAREWELL = 2.0
 BRAND = "#1f6ea5"
 """Of buttons: white on it has a contrast of 5.5 : 1."""
 REPLY = 30.0
-"""Seconds in which the page's loop has to have done what was posted."""
+"""Seconds in which a browser has to have sent its table, and the page's loop to have done what was posted."""
+LOST = "Not saved: the browser has not sent the table."
+BUSY = f"Not done: the page has not answered in {REPLY:g} s."
 LEAD_ON = """<!doctype html><title>Tables</title><p>{said}</p><script>
-const port = {port}, here = ["127.0.0.1", "localhost", "[::1]"].includes(location.hostname);
+const port = {port}, here = ["127.0.0.1", "localhost"].includes(location.hostname);
 if (!here) document.querySelector("p").textContent = {elsewhere!r};
 else if (port) location.replace(`http://${{location.hostname}}:${{port}}/{name}`);
 else if ({wait}) setTimeout(() => location.reload(), 300);
@@ -76,7 +80,7 @@ class TableServer:
         self._thread: threading.Thread | None = None
         self._server: Any = None
         self._port = 0
-        self._missing = False
+        self._trouble = ""
 
     def publish(self, page: TablePage) -> str:
         """Serve ``page`` from the next start of the server on; returns its address on the page's port."""
@@ -98,36 +102,41 @@ class TableServer:
                 self._thread = threading.Thread(target=self._serve, name="tables", daemon=True)
                 self._thread.start()
         port = self._port if self._server is not None and self._server.started else 0
-        said = MISSING if self._missing else LOADING
-        wait = "false" if self._missing else "true"
+        said = self._trouble or LOADING
+        wait = "false" if self._trouble else "true"
         text = LEAD_ON.format(said=escape(said, quote=False), port=port, elsewhere=ELSEWHERE, name=name, wait=wait)
         return WebPage(HTML, text.encode())
 
     def _serve(self) -> None:
+        """Serve until :meth:`close`; the page that leads here tells what kept it from that."""
         try:
-            import uvicorn
-            from fastapi import FastAPI
-            from nicegui import ui
+            self._run()
         except ImportError:
-            self._missing = True
-            return
+            self._trouble = MISSING
+        except (Exception, SystemExit) as error:  # whatever a server's start may raise: the page waits for it
+            self._trouble = FAILED.format(error)
+
+    def _run(self) -> None:
+        import uvicorn
+        from fastapi import FastAPI
+        from nicegui import ui
+
         application = FastAPI(openapi_url=None)
         for page in self._made.values():
             ui.page(f"/{page.name}", title=page.title)(partial(_as_ours, page.build))
         ui.run_with(application, title="Tables", dark=None, show_welcome_message=False)
-        self._port = free_port(HOST, 0)
-        options = uvicorn.Config(
-            TableGuard(application, self._port, self._token),
-            host=HOST,
-            port=self._port,
-            loop="asyncio",
-            log_level="critical",
-            limit_concurrency=MOST_CONNECTIONS,
-            ws_max_size=MOST_MESSAGE_BYTES,
-            timeout_graceful_shutdown=1,
-        )
-        self._server = uvicorn.Server(options)
-        self._server.run()
+        with socket.create_server((HOST, 0)) as listening:
+            self._port = listening.getsockname()[1]
+            options = uvicorn.Config(
+                TableGuard(application, self._port, self._token),
+                loop="asyncio",
+                log_level="critical",
+                limit_concurrency=MOST_CONNECTIONS,
+                ws_max_size=MOST_MESSAGE_BYTES,
+                timeout_graceful_shutdown=1,
+            )
+            self._server = uvicorn.Server(options)
+            self._server.run(sockets=[listening])
 
 
 class TableGuard:
@@ -200,6 +209,8 @@ async def done_by(post: Post, act: Callable[[], None]) -> str:
     done: Future[str] = Future()
 
     def carry_out() -> None:
+        if not done.set_running_or_notify_cancel():  # it came too late: whoever asked was told so
+            return
         try:
             act()
         except (ValueError, OSError) as error:
@@ -211,7 +222,10 @@ async def done_by(post: Post, act: Callable[[], None]) -> str:
         done.set_result("")
 
     post(carry_out)
-    return await asyncio.wait_for(asyncio.wrap_future(done), REPLY)
+    try:
+        return await asyncio.wait_for(asyncio.wrap_future(done), REPLY)
+    except TimeoutError:
+        return BUSY
 
 
 def link_html(where: str, words: str) -> str:

@@ -1,5 +1,8 @@
 """Marks in a photograph: from clicks to the base line and the scale of its reading."""
 
+import base64
+import io
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -8,7 +11,8 @@ from explorer.errors import CommandError
 from explorer.laboratory.command_results import Ruler, measure_words, photograph_reading
 from explorer.photograph.marks import UNMARKED, Marks, base_line_through
 from explorer.viewer.laboratory.photograph_panel import NOTHING_MARKED, marks_words
-from explorer.viewer.tables.marks_page import BASE, LENGTH, Clicks
+from explorer.viewer.tables.marks_page import BASE, LENGTH, Clicks, shown_picture
+from solver.photograph import open_picture
 from tests.solver.photograph.rendered import Look, photograph, solid_cover
 
 WIDTH = 700
@@ -20,18 +24,19 @@ def test_the_line_through_two_points_reaches_both_edges():
 
 
 def test_clicks_become_marks_and_a_third_begins_anew():
-    clicks = Clicks(WIDTH)
-    for point in ((10.0, 5.0), (100.0, 400.0), (500.0, 408.0)):
-        clicks.add(BASE, point)
+    """In a picture that is shown at half its width and a quarter of its height."""
+    clicks = Clicks(WIDTH, 2.0, 4.0)
+    for point in ((5.0, 5.0), (50.25, 100.125), (250.25, 102.125)):
+        clicks.add(BASE, *point)
     assert clicks.points[BASE] == [(500.0, 408.0)]
-    clicks.add(BASE, (100.0, 400.0))
-    clicks.add(LENGTH, (50.0, 20.0))
-    clicks.add(LENGTH, (250.0, 20.0))
+    clicks.add(BASE, 50.25, 100.125)
+    clicks.add(LENGTH, 25.25, 5.125)
+    clicks.add(LENGTH, 125.25, 5.125)
     marks = clicks.marks(100.0)
     assert marks.base_line == pytest.approx((398.0, 411.98))
     assert (marks.ends, marks.length_mm) == ((50.0, 20.0, 250.0, 20.0), 100.0)
-    assert clicks.drawn(0.5).count("<circle") == 4
-    assert clicks.drawn(0.5).count("<line") == 2
+    assert clicks.drawn().count("<circle") == 4
+    assert '<line x1="250.2" y1="102.1" x2="50.2" y2="100.1"' in clicks.drawn()
 
 
 @pytest.mark.parametrize(
@@ -48,7 +53,7 @@ def test_clicks_become_marks_and_a_third_begins_anew():
 def test_marks_that_say_nothing_are_refused(what, points, length, words):
     clicks = Clicks(WIDTH)
     for point in points:
-        clicks.add(what, point)
+        clicks.add(what, *point)
     with pytest.raises(CommandError, match=words):
         clicks.marks(length)
 
@@ -72,6 +77,28 @@ def test_marks_are_what_the_reading_and_its_command_line_go_by(tmp_path):
     assert words[words.index("--reference-length") + 1] == "100"
     assert words[words.index("--baseline") + 1] == f"{y:.1f},{y:.1f}"
     assert "--scale" not in words
+
+
+@pytest.mark.parametrize("size", [(6000, 4001), (3001, 6007), (500, 300)])
+def test_a_click_is_told_in_pixels_of_the_picture_whatever_is_shown(tmp_path, size):
+    """A dark block in a light picture: its corners as shown are its corners."""
+    pixels = np.full(size[::-1], 200, dtype=np.uint8)
+    x, y = size[0] // 2, size[1] - 60
+    pixels[y:, x:] = 20
+    path = tmp_path / "block.png"
+    Image.fromarray(pixels).save(path)
+    address, clicks = shown_picture(open_picture(path))
+    with Image.open(io.BytesIO(base64.b64decode(address.partition(",")[2]))) as opened:
+        shown = np.asarray(opened.convert("L"), dtype=float)
+    corner = edge(shown[:, -2]), edge(shown[-2])
+    clicks.add(BASE, corner[1], corner[0])
+    (found,) = clicks.points[BASE]
+    assert found == pytest.approx((x - 0.5, y - 0.5), abs=0.7)  # rows and columns left over where it is reduced
+
+
+def edge(levels):
+    """Where a row or column of pixels falls from 200 to 20, from its beginning."""
+    return np.sum(levels - 20.0) / 180.0
 
 
 def test_marks_are_told_in_words():

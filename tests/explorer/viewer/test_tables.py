@@ -13,6 +13,7 @@ from explorer.errors import CommandError
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import token_cookie
 from explorer.viewer.shell.web_pages import WebPages
+from explorer.viewer.tables import table_server
 from explorer.viewer.tables.ranges_page import RangeRow, entered_ranges
 from explorer.viewer.tables.sheet_page import column_definitions, filled_sheet, rows_of
 from explorer.viewer.tables.table_server import MISSING, TableGuard, TablePage, TableServer, done_by
@@ -124,6 +125,29 @@ def test_ranges_that_are_no_numbers_are_refused(sent, words):
         entered_ranges(RANGES, sent)
 
 
+def test_what_is_carried_out_too_late_is_not_done_and_harms_nobody(monkeypatch):
+    monkeypatch.setattr(table_server, "REPLY", 0.01)
+    actions, done = Actions(), []
+    assert "has not answered" in asyncio.run(done_by(actions.post, lambda: done.append("late")))
+    assert actions.carry_out() == ""
+    assert done == []
+
+
+def test_what_keeps_the_server_from_starting_is_told(monkeypatch):
+    def busy(*arguments):
+        raise OSError(98, "Address already in use")
+
+    monkeypatch.setattr(table_server.TableServer, "_run", busy)
+    pages = WebPages("Pour")
+    tables = TableServer(pages, None)
+    address = tables.publish(TablePage("sheet", "Sheet", lambda: None))
+    pages.page(address)
+    tables.close()
+    assert b"Tables cannot be served ([Errno 98] Address already in use)" in pages.page(address).body
+        b"else if (false) setTimeout(() => location.reload", b""
+    )
+
+
 SHEET = """# factor | a | 0 | 1 | m
 # factor | b | 0 | 1 | m
 row;run;a [m];b [m];angle_deg;who
@@ -162,6 +186,16 @@ def test_results_and_reasons_are_written_whatever_the_order_on_the_screen(sheet,
     assert filled_sheet(again, rows_of(again)) == (name, content)
 
 
+def test_a_row_that_would_become_a_comment_is_not_written(tmp_path):
+    path = tmp_path / "runs.csv"
+    path.write_text("# factor | a | 0 | 1 | m\nwho,a [m],angle_deg\nAnn,0,20\nBob,1,21\n", encoding="utf-8")
+    sheet = read_sheet(path)
+    rows = rows_of(sheet)
+    rows[0]["0"] = "#1"
+    with pytest.raises(CommandError, match="begins a row with #"):
+        filled_sheet(sheet, rows)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -178,6 +212,41 @@ def test_what_cannot_be_written_is_refused_in_one_line(sheet, change, words):
         filled_sheet(sheet, rows)
     assert words in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+def test_words_are_entered_in_a_column_of_words_and_what_nobody_changed_stays(tmp_path):
+    path = tmp_path / "runs.csv"
+    long = "see  page 4 " + "and so on " * 30 + "end"
+    lines = ["# factor | a | 0 | 1 | m", "a [m],angle_deg,note,batch,who", f"0,20,{long},A1,", "1,21,,7,"]
+    path.write_text("\n".join(lines), encoding="utf-8")
+    sheet = read_sheet(path)
+    rows = rows_of(sheet)
+    rows[1].update({"2": "wet", "3": "A2", "4": "Ann"})
+    name, content = filled_sheet(sheet, rows)
+    (tmp_path / name).write_bytes(content)
+    assert [cells[:5] for cells in read_sheet(tmp_path / name).cells] == [
+        ("0", "20", long, "A1", ""),
+        ("1", "21", "wet", "A2", "Ann"),
+    ]
+
+
+@pytest.mark.parametrize("flag", ["0", "1", "no", "TRUE", "x"])
+def test_a_flag_is_no_reason(tmp_path, flag):
+    path = tmp_path / "runs.csv"
+    path.write_text(f"# factor | a | 0 | 1 | m\na [m],angle_deg,excluded\n0,20,{flag}\n1,21,\n", encoding="utf-8")
+    with pytest.raises(CommandError, match=f"line 3, column excluded: '{flag}' is no reason"):
+        run_analyse(AnalyseOrder(sheet=str(path)))
+
+
+def test_a_run_that_is_left_out_of_a_mixture_is_named(tmp_path):
+    points = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.5, 0.5, 0), (0.5, 0, 0.5), (0, 0.5, 0.5), (0.25, 0.25, 0.5)]
+    rows = [[*point, 10 + 3 * k % 5, "cup fell" if k == 6 else ""] for k, point in enumerate(points)]
+    path = tmp_path / "blend.csv"
+    factors = [f"# factor | {name} | 0 | 1 | 1" for name in "abc"]
+    write(path, ["# design | mixture", *factors], [["a", "b", "c", "angle_deg", "excluded"], *rows])
+    found = run_analyse(AnalyseOrder(sheet=str(path)))
+    assert found.analysis.mixture is not None
+    assert found.analysis.notes[0] == "Run line 12 is left out, as the sheet says: 'cup fell'."
 
 
 def test_an_excluded_run_is_left_out_and_named(tmp_path):
