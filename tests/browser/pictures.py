@@ -371,12 +371,37 @@ def replay(browser: Browser, home: Path) -> None:
         view.take("replay", 12.0)
 
 
+def tables(browser: Browser, home: Path) -> None:
+    """Tables that are filled in, and a photograph that is clicked."""
+    with_results(home)
+    pages = {
+        "sheet": "[role=gridcell]",
+        "ranges": "[role=gridcell]",
+        "runs": "[role=gridcell]",
+        "photograph": "img",
+    }
+    with (
+        served(*POUR, "--store", home / "runs.sqlite", data=home, patience=60) as address,
+        camera(browser, address) as view,
+    ):
+        for name, shown in pages.items():
+            view.page.goto(f"{address}/tables/{name}")
+            view.page.locator(shown).first.wait_for()
+            if name == "photograph":
+                box = view.page.locator("img").first.bounding_box()
+                assert box is not None
+                for x in (0.1, 0.9):
+                    view.page.mouse.click(box["x"] + x * box["width"], box["y"] + 0.815 * box["height"])
+            view.take(f"tables_{name}")
+
+
 PARTS = {
     "first": first_visit,
     "empty": without_results,
     "work": at_work,
     "results": results,
     "sizes": sizes,
+    "tables": tables,
     "replay": replay,
 }
 BEGAN = time.monotonic()

@@ -144,8 +144,6 @@ def test_what_keeps_the_server_from_starting_is_told(monkeypatch):
     pages.page(address)
     tables.close()
     assert b"Tables cannot be served ([Errno 98] Address already in use)" in pages.page(address).body
-        b"else if (false) setTimeout(() => location.reload", b""
-    )
 
 
 SHEET = """# factor | a | 0 | 1 | m
