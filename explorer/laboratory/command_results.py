@@ -173,9 +173,8 @@ def photograph_reading(
     """
     if marks.length_mm is not None:
         ruler = Ruler(reference_mm=marks.length_mm)
-    options = dict(zip(marks.words[::2], marks.words[1::2], strict=True))
-    ends, base_line = options.get("--reference"), options.get("--baseline", "auto")
-    order = measure_order([photo], ruler.scale_mm, ruler.reference_mm, ends, base_line, None, None, None, checkerboard)
+    lengths = (ruler.scale_mm, ruler.reference_mm, marks.ends_text)
+    order = measure_order([photo], *lengths, marks.base_line_text, None, None, None, checkerboard)
     return PhotographReading(photo, ruler, checkerboard, order, run_measure(order), marks)
 
 

@@ -29,10 +29,20 @@ class Marks:
         return self != UNMARKED
 
     @property
+    def base_line_text(self) -> str:
+        """What `explorer measure --baseline` takes."""
+        return "auto" if self.base_line is None else _text(self.base_line)
+
+    @property
+    def ends_text(self) -> str | None:
+        """What `explorer measure --reference` takes."""
+        return None if self.ends is None else _text(self.ends)
+
+    @property
     def words(self) -> list[str]:
         """Options of `explorer measure` that say the same."""
-        words = [] if self.base_line is None else ["--baseline", _text(self.base_line)]
-        return words if self.ends is None else [*words, "--reference", _text(self.ends)]
+        words = [] if self.base_line is None else ["--baseline", self.base_line_text]
+        return words if self.ends_text is None else [*words, "--reference", self.ends_text]
 
 
 UNMARKED = Marks()

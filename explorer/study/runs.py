@@ -8,6 +8,7 @@ from doe.run_records import Run
 from doe.studies.study import Values, load_study, with_profile
 from doe.studies.study_result import AnyStudy
 from explorer.errors import CommandError
+from explorer.units import MISSING, observed
 from solver import Scene, pour_key, with_values
 
 
@@ -41,3 +42,9 @@ def scene_of(result: AnyStudy, stage: str, run: Run) -> tuple[Scene, bool]:
     study, _ = with_profile(study, profile.name)
     scene = with_values(study.scene_of(run.experiment), settings_of(result, stage, run.label))
     return scene, pour_key(scene, run.seed) == run.key
+
+
+def observed_of(run: Run, observable: str) -> str:
+    """What was read off a run, with its unit; a dash where it does not count."""
+    value = run.observables.get(observable)
+    return observed(observable, value) if value is not None and run.valid else MISSING

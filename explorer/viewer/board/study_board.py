@@ -19,8 +19,8 @@ from explorer.report.figures.pours import outlines_caption, pile_outlines
 from explorer.report.identified import settings
 from explorer.report.sections.answer import banner
 from explorer.report.study_charts import Plot, Plots, study_plots
-from explorer.study.runs import stages_with_runs
-from explorer.units import MISSING, enumeration, number, observable_label, observed
+from explorer.study.runs import observed_of, stages_with_runs
+from explorer.units import enumeration, number, observable_label
 from explorer.viewer.board.board import Board, BoardTable, Stage, made_charts
 from explorer.viewer.study.process_view import AT_WORK, DONE, TO_COME, time_left
 
@@ -141,7 +141,7 @@ def _runs(result: AnyStudy) -> BoardTable:
     first = {experiment_of(name): name for name in reversed(targets)}
     runs = listed_runs(result)
     rows = tuple(
-        (stage, run.title, str(run.seed), outcome_text(run.outcome), _value(run, first[run.experiment]))
+        (stage, run.title, str(run.seed), outcome_text(run.outcome), observed_of(run, first[run.experiment]))
         for stage, run in runs
     )
     opens = tuple({"do": "open_run", "stage": stage, "label": run.label, "seed": run.seed} for stage, run in runs)
@@ -150,8 +150,3 @@ def _runs(result: AnyStudy) -> BoardTable:
     )
     caption = f"Value: {read}. A click on a row pours that run in the scene."
     return BoardTable(f"Runs ({len(rows)})", Table(RUN_HEADER, rows, caption), opens)
-
-
-def _value(run: Run, observable: str) -> str:
-    value = run.observables.get(observable)
-    return observed(observable, value) if value is not None and run.valid else MISSING

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from doe.run_records import Run
 from doe.studies.exclusion import ExcludedRun
 from doe.studies.study_result import StudyResult
 from explorer.errors import CommandError
 from explorer.outcomes import outcome_text
-from explorer.units import MISSING, number, observable_label, observed, unit_of_parameter
+from explorer.study.runs import observed_of
+from explorer.units import number, observable_label, unit_of_parameter
 from explorer.viewer.actions import Post
 from explorer.viewer.tables.table_server import LOST, REPLY, TablePage, done_by
 
@@ -100,15 +100,10 @@ def run_rows(result: StudyResult, excluded: Sequence[ExcludedRun]) -> list[dict[
         }
         for run in runs:
             told = {"setting": run.title, "seed": str(run.seed), "outcome": outcome_text(run.outcome)}
-            read = {name: _observed(run, name) for name in surface.observables}
+            read = {name: observed_of(run, name) for name in surface.observables}
             why = next((one.reason for one in excluded if one.is_of(run)), "")
             rows.append({"id": str(len(rows)), REASON: why} | told | levels | read)
     return rows
-
-
-def _observed(run: Run, observable: str) -> str:
-    value = run.observables.get(observable)
-    return observed(observable, value) if value is not None and run.valid else MISSING
 
 
 def excluded_runs(result: StudyResult, sent: Sequence[object]) -> list[ExcludedRun]:
