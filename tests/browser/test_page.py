@@ -14,6 +14,7 @@ import pytest
 from explorer.viewer.panel import TABS
 from explorer.viewer.pour.readout import PHASE_WORDS
 from tests.browser.served import served
+from tests.explorer.background.waiting import wait_for
 
 pytestmark = pytest.mark.browser
 
@@ -101,13 +102,6 @@ def state(page):
     """What the pour is doing; "running" whatever its phase."""
     said = page.locator("#timeline .chip").inner_text().split(" · ")[0]
     return "running" if said in PHASE_WORDS.values() else said
-
-
-def wait_for(condition, patience=PATIENCE / 1000):
-    end = time.monotonic() + patience
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.1)
 
 
 def slider(page, label):

@@ -9,7 +9,6 @@ import os
 import subprocess
 import sys
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -19,6 +18,7 @@ from explorer.logs.pour_log import PourLog
 from explorer.logs.replay import replay_server
 from explorer.scene.file import load_scene
 from tests.browser.test_page import FLAGS, PATIENCE
+from tests.explorer.background.waiting import wait_for
 from tests.explorer.logs.test_pour_log import poses
 
 pytestmark = pytest.mark.browser
@@ -86,11 +86,14 @@ def rows_of_bodies(page):
 
 def awaited(look, wanted):
     """What ``look`` finds as soon as ``wanted`` of it holds."""
-    end = time.monotonic() + START_LIMIT
-    while not wanted(found := look()):
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.5)
-    return found
+    seen = []
+
+    def is_wanted():
+        seen[:] = [look()]
+        return wanted(seen[0])
+
+    wait_for(is_wanted, START_LIMIT)
+    return seen[0]
 
 
 def test_it_draws_the_recording_and_plays(page):

@@ -2,16 +2,21 @@
 
 import time
 
+LONGEST_TURN = 1.0
+"""[s] that one look counts for at most: while a virtual machine is held, its clock goes on and its programs do not."""
 
-def wait_for(condition, patience=120.0):
-    """What it gives once that is true.
 
-    The patience is for a busy machine, on which a command in the background hardly gets a turn.
+def wait_for(condition, patience=120.0, standing=lambda: ""):
+    """What ``condition`` gives once that is true; ``standing`` tells what there is where it never is.
+
+    The patience [s] is for a busy machine, on which a command in the background hardly gets a turn.
     """
-    end = time.monotonic() + patience
+    now = time.monotonic()
     while not (found := condition()):
-        assert time.monotonic() < end, "waited in vain"
+        assert patience > 0.0, f"waited in vain; {standing()}"
         time.sleep(0.01)
+        before, now = now, time.monotonic()
+        patience -= min(now - before, LONGEST_TURN)
     return found
 
 

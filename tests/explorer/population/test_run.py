@@ -4,7 +4,6 @@ import json
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
 
 import pytest
@@ -17,6 +16,7 @@ from explorer.population.process import PopulationProcess
 from explorer.population.run import PoursOrder, new_seeds, pour_more
 from explorer.scene.file import load_scene
 from solver import pour_key, with_values
+from tests.explorer.background.waiting import wait_for
 from tests.explorer.command_line import TINY, explorer, settings
 
 SCENE = with_values(load_scene("funnel"), TINY)
@@ -86,10 +86,7 @@ def test_the_page_hands_over_the_very_scene_and_can_cancel(law, tmp_path):
     with pytest.raises(ValueError, match="running already"):
         process.start(scene, 8)
     process.cancel()
-    end = time.monotonic() + 20.0
-    while process.status().alive:
-        assert time.monotonic() < end
-        time.sleep(0.05)
+    wait_for(lambda: not process.status().alive)
     assert process.status().state == "cancelled"
     (file,) = (tmp_path / "pours").glob("*.toml")
     assert pour_key(load_scene(str(file)), 5) == pour_key(scene, 5)
@@ -116,12 +113,9 @@ def test_cut_off_it_ends_in_order_and_keeps_what_is_there(tmp_path):
         str(store),
     ]
     process = subprocess.Popen([*command, "--threads", "1", "--out", str(tmp_path / "out")], stdout=subprocess.PIPE)
-    end = time.monotonic() + 120.0
     progress = tmp_path / "out" / PROGRESS
-    while not (progress.is_file() and len(progress.read_text().splitlines()) > 2):
-        assert time.monotonic() < end, "no pour ended"
-        assert process.poll() is None
-        time.sleep(0.05)
+    wait_for(lambda: process.poll() is not None or (progress.is_file() and len(progress.read_text().splitlines()) > 2))
+    assert process.poll() is None
     process.send_signal(signal.SIGTERM)
     process.communicate(timeout=60)
     assert process.returncode == 130

@@ -1,6 +1,5 @@
 """A session without a solver process: takes over at once what it is asked for, for tests of panels."""
 
-import time
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from explorer.viewer.panel import PageContext
 from explorer.viewer.shell.channel import ShellChannel
 from explorer.viewer.shell.web_pages import WebPages
 from solver.scenes.scene import Scene, with_values
+from tests.explorer.background.waiting import wait_for
 
 PROJECT = study_project("sunflower_extract")
 
@@ -80,15 +80,16 @@ def page_of(server, session, diagnosis, data, channel=None):
     return Page(server, session, PROJECT, study, diagnosis, channel or ShellChannel(), WebPages("test"))
 
 
-def finished(actions: Actions, background: BackgroundWork, patience: float = 30.0) -> str:
+def finished(actions: Actions, background: BackgroundWork) -> str:
     """Carry out what waits, what is done in the background, and what comes of it; the line of a refusal, or ""."""
-    end, notice = time.monotonic() + patience, ""
-    while True:
-        notice = actions.carry_out() or notice
-        if not background.busy_with:
-            return notice
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.005)
+    notices = []
+
+    def is_done() -> bool:
+        notices.append(actions.carry_out() or "")
+        return not background.busy_with
+
+    wait_for(is_done)
+    return next((notice for notice in reversed(notices) if notice), "")
 
 
 def frame_of(component: list[int], position: object, inside: list[bool] | None = None, generation: int = 1) -> Frame:

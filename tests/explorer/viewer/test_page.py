@@ -16,6 +16,7 @@ from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.panel import LOOK, SELDOM, Panel, Tab
 from explorer.viewer.panels import PANELS
 from solver.scenes.scene import value
+from tests.explorer.background.waiting import wait_for
 from tests.explorer.viewer.page_session import PageSession, frame_of, page_of
 
 SOURCE = material_source("sunflower_extract")
@@ -65,13 +66,6 @@ def running(tmp_path, monkeypatch):
     page.close()
     diagnosis.close()
     server.stop()
-
-
-def wait_for(condition):
-    end = time.monotonic() + 20.0
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.02)
 
 
 def test_a_change_reaches_list_chart_and_command_line_and_is_undone(running):

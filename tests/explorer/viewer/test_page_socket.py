@@ -259,7 +259,12 @@ def stands(page, seed, moment, after=0):
         there = (now.seed, now.state) == (seed, SessionState.PAUSED) and now.generation > after and now.time >= moment
         return there and frame is not None and (frame.generation, frame.time) == (now.generation, now.time)
 
-    wait_for(still, 60.0)
+    def standing():
+        now, frame = status(page), page.look._drawn
+        drawn = None if frame is None else (frame.generation, frame.time)
+        return f"{now.state}, {now.message!r}, {(now.seed, now.generation, now.time)}, {drawn}, {page.page._notice!r}"
+
+    wait_for(still, standing=standing)
     return page.look._drawn
 
 

@@ -1,7 +1,6 @@
 """The page of a recording: what is drawn at a moment is what was recorded, whoever moves the slider."""
 
 import threading
-import time
 from contextlib import nullcontext
 from dataclasses import replace
 from types import SimpleNamespace
@@ -23,6 +22,7 @@ from explorer.viewer.palette import STILL, linear, linear_all, mapped
 from explorer.viewer.replay.replay_page import MeshNodes, ReplayPage, columns, drawn_height, moment_html
 from explorer.viewer.scene_nodes import PLATE_RADIUS, SceneNodes, plate_radius
 from explorer.viewer.view import light, look_at_height
+from tests.explorer.background.waiting import wait_for
 from tests.explorer.logs.test_pour_log import poses
 
 
@@ -186,10 +186,8 @@ def test_it_plays_by_itself_to_the_end(page):
     stop = threading.Event()
     loop = threading.Thread(target=page.run, args=(stop,))
     loop.start()
-    deadline = time.monotonic() + 20.0
-    while page._timeline.playing and time.monotonic() < deadline:
-        time.sleep(0.02)
-    time.sleep(0.1)
+    wait_for(lambda: not page._timeline.playing)
+    wait_for(lambda: page._timeline.time == pytest.approx(0.06) and len(drawn(page)) == 4)
     stop.set()
     loop.join()
     assert page._timeline.time == pytest.approx(0.06)
@@ -272,9 +270,7 @@ def test_what_is_refused_is_told(page):
     loop = threading.Thread(target=page.run, args=(stop,))
     loop.start()
     entered(page._look._colours._high, -1.0)
-    deadline = time.monotonic() + 20.0
-    while "is not above" not in page._text.content and time.monotonic() < deadline:
-        time.sleep(0.02)
+    wait_for(lambda: "is not above" in page._text.content)
     stop.set()
     loop.join()
     assert "colour range: its end -1 is not above its beginning 0" in page._text.content
