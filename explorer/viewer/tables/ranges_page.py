@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 from doe.table_file import CellTable
 from explorer.errors import CommandError
-from explorer.viewer.actions import Post
-from explorer.viewer.tables.table_server import LOST, REPLY, TablePage, done_by
+from explorer.viewer.actions import Action, Post
+from explorer.viewer.tables.grid import WRITTEN, column, table_heading, table_to_edit
+from explorer.viewer.tables.table_server import TablePage
 
 TITLE = "Ranges of the next study"
 HOW = (
@@ -17,7 +18,7 @@ HOW = (
     "next study starts from these ranges."
 )
 SAVED = "Saved: the next study starts from these ranges."
-WRITTEN = {"low": "Low", "high": "High", "measured": "Measured value"}
+ENTERED = {"low": "Low", "high": "High", "measured": "Measured value"}
 Range = tuple[float, float, float]
 """Low, high and measured value, in the unit that is shown."""
 NUMBERS = CellTable((), (), decimal_comma=True)
@@ -48,38 +49,20 @@ def ranges_page(in_hand: RangesInHand, post: Post) -> TablePage:
 
 
 def _build(in_hand: RangesInHand, post: Post) -> None:
-    from nicegui import ui
-
     rows = in_hand.rows()
-    ui.label(TITLE).classes("text-h6").props("role=heading aria-level=1")
-    ui.label(HOW)
-    columns: list[dict[str, object]] = [
-        {"headerName": head, "field": name, "sortable": True, "filter": "agTextColumnFilter", "flex": flex}
-        for name, head, flex in (("name", "Factor", 1), ("label", "Parameter", 4), ("unit", "Unit", 1))
-    ]
-    columns += [
-        {"headerName": head, "field": name, "editable": True, "cellDataType": "text", "flex": 1}
-        | {"cellStyle": {"background": "rgba(31,110,165,0.08)"}}
-        for name, head in WRITTEN.items()
-    ]
-    grid = ui.aggrid(
-        {"columnDefs": columns, "rowData": [_cells(row) for row in rows], "stopEditingWhenCellsLoseFocus": True}
-    ).style("height: calc(100vh - 12rem)")
-    told = ui.label("").props("role=status")
+    columns = [column("Factor", "name"), column("Parameter", "label", flex=4), column("Unit", "unit")]
+    columns += [column(head, name, **WRITTEN) for name, head in ENTERED.items()]
 
-    async def save() -> None:
-        try:
-            ranges = entered_ranges(rows, await grid.get_client_data(timeout=REPLY))
-        except (CommandError, TimeoutError) as error:
-            told.text = str(error) or LOST
-            return
-        told.text = await done_by(post, lambda: in_hand.take(ranges)) or SAVED
+    def entered(sent: Sequence[object]) -> tuple[Action, str]:
+        ranges = entered_ranges(rows, sent)
+        return lambda: in_hand.take(ranges), SAVED
 
-    ui.button("Save", on_click=save).props("no-caps")
+    table_heading(TITLE, HOW)
+    table_to_edit(columns, [_cells(row) for row in rows], entered, post)
 
 
 def _cells(row: RangeRow) -> dict[str, str]:
-    values = zip(WRITTEN, row.range, strict=True)
+    values = zip(ENTERED, row.range, strict=True)
     return {"name": row.name, "label": row.label, "unit": row.unit} | {key: f"{value:.6g}" for key, value in values}
 
 
@@ -91,7 +74,7 @@ def entered_ranges(rows: Sequence[RangeRow], sent: Sequence[object]) -> dict[str
         cells = found.get(row.name)
         if cells is None:
             raise CommandError(f"{row.name}: is not in the table any more; open it again")
-        low, high, measured = (_number(row.name, head, cells.get(key)) for key, head in WRITTEN.items())
+        low, high, measured = (_number(row.name, head, cells.get(key)) for key, head in ENTERED.items())
         ranges[row.name] = (low, high, measured)
     return ranges
 

@@ -11,8 +11,9 @@ from explorer.errors import CommandError
 from explorer.outcomes import outcome_text
 from explorer.study.runs import observed_of
 from explorer.units import number, observable_label, unit_of_parameter
-from explorer.viewer.actions import Post
-from explorer.viewer.tables.table_server import LOST, REPLY, TablePage, done_by
+from explorer.viewer.actions import Action, Post
+from explorer.viewer.tables.grid import WRITTEN, column, entered_text, table_heading, table_to_edit, with_unit
+from explorer.viewer.tables.table_server import TablePage
 
 TITLE = "Runs of the response surface"
 HOW = (
@@ -22,7 +23,6 @@ HOW = (
 SAVED = "Saved: the board shows the answer without the runs that have a reason."
 NO_RESULT = "No finished study is shown under Calibrate."
 REASON = "reason"
-LONGEST_REASON = 200
 
 
 @dataclass(frozen=True)
@@ -46,45 +46,20 @@ def _build(in_hand: RunsInHand, post: Post) -> None:
     if result is None:
         ui.label(NO_RESULT).props("role=alert")
         return
-    ui.label(f"{TITLE}: {result.study.title}").classes("text-h6").props("role=heading aria-level=1")
-    ui.label(HOW)
-    try:
-        rows = run_rows(result, in_hand.excluded())
-    except CommandError as error:
-        ui.label(str(error)).props("role=alert")
-        return
-    columns = [
-        {"headerName": head, "field": name, "sortable": True, "filter": "agTextColumnFilter", "minWidth": 95, "flex": 1}
-        | {"wrapHeaderText": True, "autoHeaderHeight": True}
-        for name, head in _heads(result).items()
-    ]
-    columns.append(
-        {"headerName": "Left out because", "field": REASON, "editable": True, "cellDataType": "text", "flex": 1}
-        | {"minWidth": 200, "sortable": True, "filter": "agTextColumnFilter"}
-        | {"cellStyle": {"background": "rgba(31,110,165,0.08)"}}
-    )
-    grid = ui.aggrid({"columnDefs": columns, "rowData": rows, "stopEditingWhenCellsLoseFocus": True}).style(
-        "height: calc(100vh - 12rem)"
-    )
-    told = ui.label("").props("role=status")
+    columns = [column(head, name, minWidth=95) for name, head in _heads(result).items()]
+    columns.append(column("Left out because", REASON, minWidth=200, **WRITTEN))
 
-    async def save() -> None:
-        try:
-            excluded = excluded_runs(result, await grid.get_client_data(timeout=REPLY))
-        except (CommandError, TimeoutError) as error:
-            told.text = str(error) or LOST
-            return
-        told.text = await done_by(post, lambda: in_hand.take(result, excluded)) or SAVED
+    def entered(sent: Sequence[object]) -> tuple[Action, str]:
+        excluded = excluded_runs(result, sent)
+        return lambda: in_hand.take(result, excluded), SAVED
 
-    ui.button("Save", on_click=save).props("no-caps")
+    table_heading(f"{TITLE}: {result.study.title}", HOW)
+    table_to_edit(columns, run_rows(result, in_hand.excluded()), entered, post)
 
 
 def _heads(result: StudyResult) -> dict[str, str]:
     """Field of a row → head of its column."""
-    factors = {}
-    for factor in result.surface.factors:
-        symbol = unit_of_parameter(factor.path).symbol
-        factors[factor.name] = f"{factor.name} [{symbol}]" if symbol else factor.name
+    factors = {one.name: with_unit(one.name, unit_of_parameter(one.path).symbol) for one in result.surface.factors}
     observables = {name: observable_label(name) for name in result.surface.observables}
     return {"setting": "Setting"} | factors | {"seed": "Seed", "outcome": "Outcome"} | observables
 
@@ -114,11 +89,7 @@ def excluded_runs(result: StudyResult, sent: Sequence[object]) -> list[ExcludedR
         raise CommandError("these are not the runs of the study; open the table again")
     excluded = []
     for k, run in enumerate(runs):
-        reason = " ".join(str(found[str(k)] or "").split())
-        if len(reason) > LONGEST_REASON:
-            raise CommandError(
-                f"{run.title}, seed {run.seed}: {len(reason)} characters; allowed: up to {LONGEST_REASON}"
-            )
+        reason = entered_text(found[str(k)], f"{run.title}, seed {run.seed}")
         if reason:
             excluded.append(ExcludedRun(run.label, run.experiment, run.seed, reason))
     return excluded

@@ -10,13 +10,15 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from explorer.design.factors_file import EXCLUDED
 from explorer.design.filled_sheet import EMPTY_CELLS, Sheet, read_sheet, short
 from explorer.errors import CommandError
-from explorer.viewer.actions import Post
+from explorer.viewer.actions import Action, Post
 from explorer.viewer.laboratory.inputs import UploadSlot
-from explorer.viewer.tables.table_server import LOST, REPLY, TablePage, done_by
+from explorer.viewer.tables.grid import WRITTEN, Column, column, entered_text, table_heading, table_to_edit, with_unit
+from explorer.viewer.tables.table_server import TablePage
 from solver.assets import asset_path
 
 TITLE = "Sheet of runs"
@@ -24,7 +26,6 @@ SAVED_AS = "_filled"
 """Behind the name of a sheet, in that of what was filled in."""
 KEPT_NAME = re.compile(rf"({SAVED_AS})?(-[0-9a-f]{{12}})?$")
 """What was put behind the name of a sheet when it was kept."""
-LONGEST_REASON = 200
 MOST_CELLS = 20_000
 """More do not fit into one message of a browser."""
 HOW = (
@@ -69,27 +70,13 @@ def _build(in_hand: SheetInHand, post: Post) -> None:
     except ValueError as error:
         ui.label(str(error)).props("role=alert")
         return
-    ui.label(f"{TITLE}: {sheet.path.name}").classes("text-h6").props("role=heading aria-level=1")
-    ui.label(HOW)
-    grid = ui.aggrid(
-        {
-            "columnDefs": column_definitions(sheet),
-            "rowData": rows_of(sheet),
-            "stopEditingWhenCellsLoseFocus": True,
-            "enterNavigatesVerticallyAfterEdit": True,
-        }
-    ).style("height: calc(100vh - 12rem)")
-    told = ui.label("").props("role=status")
 
-    async def save() -> None:
-        try:
-            name, content = filled_sheet(sheet, await grid.get_client_data(timeout=REPLY))
-        except (CommandError, TimeoutError) as error:
-            told.text = str(error) or LOST
-            return
-        told.text = await done_by(post, lambda: in_hand.take(name, content)) or SAVED.format(name)
+    def entered(rows: Sequence[Any]) -> tuple[Action, str]:
+        name, content = filled_sheet(sheet, rows)
+        return lambda: in_hand.take(name, content), SAVED.format(name)
 
-    ui.button("Save", on_click=save).props("no-caps")
+    table_heading(f"{TITLE}: {sheet.path.name}", HOW)
+    table_to_edit(column_definitions(sheet), rows_of(sheet), entered, post)
 
 
 def editable(sheet: Sheet) -> tuple[str, ...]:
@@ -97,26 +84,16 @@ def editable(sheet: Sheet) -> tuple[str, ...]:
     return (*sheet.responses, EXCLUDED)
 
 
-def column_definitions(sheet: Sheet) -> list[dict[str, object]]:
+def column_definitions(sheet: Sheet) -> list[Column]:
     """Of AG Grid: one per column, that of exclusions last even where the sheet has none yet."""
     written = editable(sheet)
     units = {factor.name: factor.unit for factor in sheet.factors} | {
         k: unit for k, unit in sheet.units.items() if unit
     }
     return [
-        {
-            "headerName": f"{name} [{units[name]}]" if units.get(name) else name,
-            "field": str(position),
-            "editable": name in written,
-            "filter": "agTextColumnFilter",
-            "sortable": True,
-            "cellDataType": "text",
-            "wrapHeaderText": True,
-            "autoHeaderHeight": True,
-            "cellStyle": {"background": "rgba(31,110,165,0.08)"} if name in written else {},
-            "flex": 2 if name == EXCLUDED else 1,
-            "minWidth": 130,
-        }
+        column(with_unit(name, units.get(name)), str(position), minWidth=130)
+        | (WRITTEN if name in written else {})
+        | ({"flex": 2} if name == EXCLUDED else {})
         for position, name in enumerate(_columns(sheet))
     ]
 
@@ -152,7 +129,7 @@ def filled_sheet(sheet: Sheet, rows: Sequence[Mapping[str, object]]) -> tuple[st
             _check_column(sheet, name, now)
         for row, cell in zip(table, now, strict=True):
             row[place] = cell
-    header = [f"{name} [{sheet.units[name]}]" if sheet.units.get(name) else name for name in columns]
+    header = [with_unit(name, sheet.units.get(name)) for name in columns]
     text = io.StringIO()
     text.writelines(f"{comment}\n" for _, comment in sheet.table.comments)
     csv.writer(text, delimiter=";" if sheet.table.decimal_comma else ",", lineterminator="\n").writerows(
@@ -177,10 +154,7 @@ def _entered(line: int, name: str, value: object, before: str) -> str:
     text = str("" if value is None else value)
     if text == before:
         return before
-    text = " ".join(text.split())
-    if len(text) > LONGEST_REASON:
-        raise CommandError(f"line {line}, {name}: {len(text)} characters; allowed: up to {LONGEST_REASON}")
-    return text
+    return entered_text(text, f"line {line}, {name}")
 
 
 def _numbers(sheet: Sheet, cells: Sequence[str]) -> list[bool]:
