@@ -1,6 +1,5 @@
 """The tab "Laboratory": a press shows the answer, uploads are offered and kept, what is wrong is one line."""
 
-import html
 import io
 import re
 import shlex
@@ -12,13 +11,11 @@ from types import SimpleNamespace
 import numpy as np
 import openpyxl
 import pytest
-from viser import UploadedFile
 
 from doe.designs import DESIGNS
 from doe.laboratory import TESTS
 from doe.laboratory.analysis import template_of
 from doe.measurement import load_measurement
-from explorer.design.run_plan import DesignOrder
 from explorer.files.uploads import kept_measurements
 from explorer.laboratory.command_results import CommandResult, template_file
 from explorer.laboratory.run import LabOrder, run_lab
@@ -40,7 +37,8 @@ from explorer.viewer.study.reports_panel import NONE, ReportsPanel
 from solver.assets import asset_path
 from tests.explorer.command_line import explorer
 from tests.explorer.measured.test_balance import BEGINS, MASS, steady, write
-from tests.explorer.viewer.page_session import PageSession, event, finished, page_context
+from tests.explorer.viewer.page_session import PageSession, finished, page_context
+from tests.explorer.viewer.person import Person
 from tests.solver.photograph.rendered import save
 from tests.solver.photograph.staged import Stage, staged
 from tests.solver.photograph.test_checkerboard import LOOK
@@ -49,59 +47,71 @@ from tests.solver.photograph.test_checkerboard import board as checkerboard
 pytestmark = pytest.mark.usefixtures("unprinted")
 
 
-class Bench:
-    """Panels over one background, as in the tab."""
+PANELS = (
+    *(BenchPanel, RigPanel, PhotographPanel, DesignPanel, AnalysisPanel, AuditPanel, MeasuredDataPanel),
+    *(LaboratoryPanel, ReportsPanel),
+)
+
+
+class Room:
+    """Panels over one background, as in the tab, and a person at each of them."""
 
     def __init__(self, server, folder):
         self.actions, self.folder = Actions(), folder
         self.session = PageSession(material_source("sunflower_extract"))
-        page = page_context(server, self.session, self.actions.post, folder)
-        self.background = page.bench_work
-        self.bench, self.rig, self.photograph = BenchPanel(page), RigPanel(page), PhotographPanel(page)
-        self.design, self.analysis = DesignPanel(page), AnalysisPanel(page)
-        self.audit, self.reports = AuditPanel(page), ReportsPanel(page)
-        self.data = MeasuredDataPanel(page)
-        self.page = page
+        self.page = page_context(server, self.session, self.actions.post, folder)
+        self.panels, self._places = {}, {}
+        for kind in PANELS:
+            with server.gui.add_folder(kind.name) as self._places[kind]:
+                self.panels[kind] = kind(self.page)
 
-    def do(self, act):
-        self.actions.post(act)
-        return finished(self.actions, self.background)
+    def at(self, kind):
+        return Person(self._places[kind], lambda: finished(self.actions, self.page.bench_work))
 
-    def choose_rig(self, name):
-        self.rig._rig.value = name
-        event(self.rig._rig, name)
-        finished(self.actions, self.background)
+    def show(self, kind, notice=""):
+        self.panels[kind].show(Now(self.session.now, notice=notice))
 
 
 @pytest.fixture
-def bench(server, tmp_path):
-    return Bench(server, tmp_path / "uploads")
+def room(server, tmp_path):
+    return Room(server, tmp_path / "uploads")
 
 
-def text_of(view):
-    return view._text.content
+@pytest.fixture
+def bench(room):
+    return room.at(BenchPanel)
+
+
+@pytest.fixture
+def design(room):
+    return room.at(DesignPanel)
+
+
+@pytest.fixture
+def analysis(room):
+    return room.at(AnalysisPanel)
+
+
+@pytest.fixture
+def photograph(room):
+    return room.at(PhotographPanel)
 
 
 def test_every_shipped_bench_test_is_a_choice_and_an_answer(bench):
-    for test in bench.bench._test.options:
-        bench.bench._test.value = test
-        bench.bench._readings.offer((test,))
-        assert bench.do(bench.bench._evaluate) == ""
-        assert f"explorer lab {test} {test}" in text_of(bench.bench.view)
-        assert not bench.bench.view._take.disabled
+    for test in bench.options("Test"):
+        assert bench.enter("Test", test) == ""
+        assert bench.press("Evaluate") == ""
+        assert f"explorer lab {test} {test}" in bench.text
+        assert not bench.control("Take the files along").disabled
 
 
 def test_the_choice_of_tests_is_the_list_of_tests_and_each_comes_with_its_examples(bench):
-    assert tuple(bench.bench._test.options) == tuple(TESTS)
+    assert bench.options("Test") == tuple(TESTS)
     for test in TESTS:
-        bench.bench._test.value = test
-        event(bench.bench._test, test)
-        assert finished(bench.actions, bench.background) == ""
-        assert bench.bench._readings.chosen == test
-    bench.bench._test.value = "rebound"
-    event(bench.bench._test, "rebound")
-    finished(bench.actions, bench.background)
-    assert tuple(bench.bench._readings._choice.options) == ("rebound", "rebound_glass_acrylic")
+        assert bench.enter("Test", test) == ""
+        assert bench.value("Readings") == test
+    bench.enter("Test", "rebound")
+    assert bench.options("Readings") == ("rebound", "rebound_glass_acrylic")
 
 
 def test_the_sheet_of_a_test_is_what_the_command_prints():
@@ -109,40 +119,30 @@ def test_the_sheet_of_a_test_is_what_the_command_prints():
     assert (name, content.decode()) == ("sieve_sheet.csv", template_of("sieve"))
 
 
-def test_a_pour_starts_with_what_was_measured(bench):
-    bench.bench._test.value = "inclined_plane"
-    bench.bench._readings.offer(("inclined_plane",))
-    assert bench.do(bench.bench._pour) == ""
-    assert bench.session.asked == ["start"]
-    assert bench.session.source.material.endswith(".toml")
+def test_a_pour_starts_with_what_was_measured(room, bench):
+    bench.enter("Test", "inclined_plane")
+    assert bench.press("Pour with these parameters") == ""
+    assert room.session.asked == ["start"]
+    assert room.session.source.material.endswith(".toml")
 
 
-def test_bad_readings_are_one_line_and_the_pour_stays(bench):
-    slot = bench.bench._readings
-    bench.actions.post(lambda: slot.take("mine.csv", b"a,b,replicate,angle_deg\nx,y,1,steep\n"))
-    assert finished(bench.actions, bench.background) == ""
-    bench.bench._test.value = "inclined_plane"
-    for act in (bench.bench._evaluate, bench.bench._pour):
-        notice = bench.do(act)
+def test_bad_readings_are_one_line_and_the_pour_stays(room, bench):
+    assert bench.enter("Test", "inclined_plane") == ""
+    assert bench.upload("Upload: readings", "mine.csv", b"a,b,replicate,angle_deg\nx,y,1,steep\n") == ""
+    for button in ("Evaluate", "Pour with these parameters"):
+        notice = bench.press(button)
         assert "steep" in notice
         assert "\n" not in notice
-    assert bench.session.asked == []
+    assert room.session.asked == []
 
 
 @pytest.mark.parametrize(("name", "content"), [("readings.exe", b"x"), ("readings.csv", b"")])
-def test_what_cannot_be_kept_is_refused(bench, name, content):
-    notice = bench.do(lambda: bench.bench._readings.take(name, content))
-    assert "allowed" in notice
-    assert not bench.folder.exists() or not list(bench.folder.iterdir())
+def test_what_cannot_be_kept_is_refused(room, bench, name, content):
+    assert "allowed" in bench.upload("Upload: readings", name, content)
+    assert not room.folder.exists() or not list(room.folder.iterdir())
 
 
-def choose_design(bench, name):
-    bench.design._kind.value = name
-    event(bench.design._kind, name)
-    assert finished(bench.actions, bench.background) == ""
-
-
-def test_a_design_asks_for_what_it_takes(bench):
+def test_a_design_asks_for_what_it_takes(design):
     labels = {
         "runs": "Size",
         "centre": "Centre runs",
@@ -156,91 +156,94 @@ def test_a_design_asks_for_what_it_takes(bench):
         "constraints": "Constraints",
         "kept": "Finished runs",
     }
-    for name, design in DESIGNS.items():
-        choose_design(bench, name)
-        shown = shown_labels(bench.design)
+    for name, kind in DESIGNS.items():
+        assert design.enter("Design", name) == ""
+        shown = set(design.labels)
         # All that the command's design takes; levels are those of the file of factors. Blocks go with every design.
-        assert {key for key, label in labels.items() if label in shown} == set(design.options) - {"blocks", "levels"}
+        assert {key for key, label in labels.items() if label in shown} == set(kind.options) - {"blocks", "levels"}
         assert {"Blocks", "Runs of each row", "Seed"} <= shown
-        assert design.doc in unescape(bench.design._for.content)
-    choose_design(bench, "box-behnken")
-    bench.design._numbers["blocks"].value = "2"
-    assert "3 factors; there are none that are orthogonal" in bench.do(bench.design._make)
-
-
-def shown_labels(panel):
-    """Labels of what a panel shows."""
-    handles = [one for one in (*vars(panel).values(), *panel._numbers.values()) if getattr(one, "visible", False)]
-    return {getattr(getattr(one, "_choice", one), "label", "") for one in handles}
+        assert " ".join(kind.doc.split()) in design.text
+    design.enter("Design", "box-behnken")
+    design.enter("Blocks", "2")
+    assert "3 factors; there are none that are orthogonal" in design.press("Make the sheet")
 
 
 @pytest.mark.parametrize(
     ("kind", "entered", "words"),
     [
-        ("central-composite", {"alpha": "face-centred", "centre": "3"}, "--centre 3 --alpha face-centred"),
-        ("factorial", {"fraction": "1", "seed": "7"}, "--fraction 1 --seed 7"),
-        ("d-optimal", {"runs": "12", "constraints": "shear_modulus + 60*restitution <= 90"}, "'shear_modulus + 60"),
-        ("i-optimal", {"model": "linear", "replicates": "2"}, "--replicates 2 --model linear"),
-        ("box-behnken", {"replicates": "2", "blocks": "2"}, "--replicates 2 --blocks 2"),
+        (
+            "central-composite",
+            {"Axial points": "face-centred", "Centre runs": "3"},
+            "--centre 3 --alpha face-centred",
+        ),
+        ("factorial", {"Fraction P": "1", "Seed": "7"}, "--fraction 1 --seed 7"),
+        ("d-optimal", {"Size": "12", "Constraints": "shear_modulus + 60*restitution <= 90"}, "'shear_modulus + 60"),
+        ("i-optimal", {"Model": "linear", "Runs of each row": "2"}, "--replicates 2 --model linear"),
+        ("box-behnken", {"Runs of each row": "2", "Blocks": "2"}, "--replicates 2 --blocks 2"),
     ],
 )
-def test_what_stands_in_the_form_is_in_the_command_that_repeats_it(bench, kind, entered, words):
-    choose_design(bench, kind)
-    for name, value in entered.items():
-        bench.design._fields.get(name, bench.design._numbers.get(name)).value = value
-    assert bench.do(bench.design._make) == ""
-    assert words in unescape(text_of(bench.design.view))
+def test_what_stands_in_the_form_is_in_the_command_that_repeats_it(design, kind, entered, words):
+    design.enter("Design", kind)
+    for label, value in entered.items():
+        design.enter(label, value)
+    assert design.press("Make the sheet") == ""
+    assert words in design.text
 
 
-def test_a_form_left_as_it_is_asks_for_what_the_command_does(bench):
-    assert bench.design._order() == DesignOrder("box-behnken")
+def test_a_form_left_as_it_is_asks_for_what_the_command_does(design):
+    def command():
+        assert design.press("Make the sheet") == ""
+        return command_in(design)
+
+    assert command() == "explorer design box-behnken --factors sunflower_extract --out runs.csv"
     # What was entered for another design is no part of this one.
-    choose_design(bench, "central-composite")
-    bench.design._alpha.value = "inscribed"
-    choose_design(bench, "lhs")
-    assert bench.design._order() == DesignOrder("lhs")
+    design.enter("Design", "central-composite")
+    design.enter("Axial points", "inscribed")
+    design.enter("Design", "lhs")
+    assert command() == "explorer design lhs --factors sunflower_extract --out runs.csv"
 
 
 @pytest.mark.parametrize(
-    ("entered", "words"),
+    ("label", "entered", "words"),
     [
-        ({"centre": "-1"}, "Centre runs '-1': allowed is a whole number, 0 … 1000, or nothing"),
-        ({"seed": "1.5"}, "Seed '1.5': allowed is a whole number, 0 and more"),
-        ({"replicates": "many"}, "Runs of each row 'many'"),
-        ({"blocks": "1"}, "2 … 512"),
+        ("Centre runs", "-1", "Centre runs '-1': allowed is a whole number, 0 … 1000, or nothing"),
+        ("Seed", "1.5", "Seed '1.5': allowed is a whole number, 0 and more"),
+        ("Runs of each row", "many", "Runs of each row 'many'"),
+        ("Blocks", "1", "2 … 512"),
     ],
 )
-def test_a_number_that_the_command_refuses_is_refused(bench, entered, words):
-    for name, value in entered.items():
-        bench.design._numbers[name].value = value
-    notice = bench.do(bench.design._make)
+def test_a_number_that_the_command_refuses_is_refused(design, label, entered, words):
+    design.enter(label, entered)
+    notice = design.press("Make the sheet")
     assert words in notice
     assert "\n" not in notice
 
 
-def test_runs_are_added_to_a_sheet_that_was_sent(bench):
+def test_runs_are_added_to_a_sheet_that_was_sent(design):
     sheet = asset_path("runs", "sunflower_extract").read_bytes()
-    choose_design(bench, "d-optimal")
-    assert bench.do(lambda: bench.design._kept.take("first.csv", sheet)) == ""
-    bench.design._numbers["runs"].value = "3"
-    assert bench.do(bench.design._make) == ""
-    assert "20 rows × 1 = 20 runs" in text_of(bench.design.view)
-    (content,) = bench.design.view._answer.files.values()
+    design.enter("Design", "d-optimal")
+    assert design.upload("Upload: finished runs", "first.csv", sheet) == ""
+    design.enter("Size", "3")
+    assert design.press("Make the sheet") == ""
+    assert "20 rows × 1 = 20 runs" in design.text
+    assert design.press("Take the files along") == ""
+    (content,) = design.browser.sent.values()
     assert content.decode().count("24.") > 0  # results of the finished runs
 
 
 @pytest.mark.parametrize(
     ("choice", "name", "head"), [(1, "runs.csv", "\ufeff# design".encode()), (2, "runs.xlsx", b"PK")]
 )
-def test_a_sheet_is_made_for_the_spreadsheet_that_opens_it_and_comes_back_filled(bench, choice, name, head):
-    bench.design._format.value = bench.design._format.options[choice]
-    assert bench.do(bench.design._make) == ""
-    ((taken, content),) = bench.design.view._answer.files.items()
+def test_a_sheet_is_made_for_the_spreadsheet_that_opens_it_and_comes_back_filled(design, analysis, choice, name, head):
+    design.enter("Sheet as", design.options("Sheet as")[choice])
+    assert design.press("Make the sheet") == ""
+    assert design.press("Take the files along") == ""
+    ((taken, content),) = design.browser.sent.items()
     assert taken == name
     assert content.startswith(head)
-    assert bench.do(lambda: bench.analysis._filled.take(name, filled(content, name))) == ""
-    assert bench.do(bench.analysis._analyse) == ""
-    assert re.search(r"total +[\d.]+ +16\b", text_of(bench.analysis.view))  # degrees of freedom of 17 runs
+    assert analysis.upload("Upload: sheet", name, filled(content, name)) == ""
+    assert analysis.press("Analyse") == ""
+    assert re.search(r"total +[\d.]+ +16\b", analysis.text)  # degrees of freedom of 17 runs
 
 
 def filled(content, name):
@@ -258,34 +261,34 @@ def filled(content, name):
     return sent.getvalue()
 
 
-def test_the_factors_file_to_edit_is_the_chosen_one(bench):
-    assert bench.design._factors_file() == (
-        "sunflower_extract.toml",
-        asset_path("designs", "sunflower_extract").read_bytes(),
-    )
+def test_the_factors_file_to_edit_is_the_chosen_one(design):
+    assert design.press("Factors file to edit") == ""
+    assert design.browser.sent == {"sunflower_extract.toml": asset_path("designs", "sunflower_extract").read_bytes()}
 
 
-def test_a_mixture_is_asked_for_its_lattice(bench):
+def test_a_mixture_is_asked_for_its_lattice(design):
     part = '[[factor]]\nname = "%s"\nlow = 0\nhigh = 100\nunit = "%%"\n'
-    choose_design(bench, "mixture")
-    assert "high less low is not the same" in bench.do(bench.design._make)  # the shipped factors are no parts
+    design.enter("Design", "mixture")
+    assert "high less low is not the same" in design.press("Make the sheet")  # the shipped factors are no parts
     blend = "".join(part % one for one in ("sand", "clay", "silt"))
-    assert bench.do(lambda: bench.design._factors.take("soil.toml", blend.encode())) == ""
-    bench.design._numbers["lattice"].value = "2"
-    assert bench.do(bench.design._make) == ""
-    assert "--lattice 2" in text_of(bench.design.view)
+    assert design.upload("Upload: factors", "soil.toml", blend.encode()) == ""
+    design.enter("Degree of the lattice", "2")
+    assert design.press("Make the sheet") == ""
+    assert "--lattice 2" in design.text
 
 
 def test_a_bench_test_asks_for_what_it_takes(bench):
-    panel = bench.bench
-    boxes = {"compression": panel._compression, "left_out": panel._left_out, "twin": panel._twin, "bias": panel._bias}
+    boxes = {
+        "compression": "Compression readings",
+        "left_out": "Leave out",
+        "twin": "Repeat it on the solver",
+        "bias": "Where the formula misses",
+    }
     takers = {name: set() for name in boxes}
     for test in TESTS:
-        panel._test.value = test
-        event(panel._test, test)
-        finished(bench.actions, bench.background)
-        for name, box in boxes.items():
-            takers[name] |= {test} if box.visible else set()
+        bench.enter("Test", test)
+        for name, label in boxes.items():
+            takers[name] |= {test} if bench.sees(label) else set()
     assert takers["compression"] == {"shear"}
     assert takers["left_out"] == {"composition"}
     # What the command refuses is not offered.
@@ -298,85 +301,88 @@ def test_a_bench_test_asks_for_what_it_takes(bench):
     assert len(takers["bias"]) == 5
 
 
-def test_a_photograph_from_the_browser_is_read_and_shown(bench):
+def test_a_photograph_from_the_browser_is_read_and_shown(photograph):
     content = asset_path("photographs", "cone_25_30").read_bytes()
-    assert bench.do(lambda: bench.photograph._photo.take("my pile.JPG", content)) == ""
-    assert bench.do(bench.photograph._read) == ""
-    assert "explorer measure" in text_of(bench.photograph.view)
-    assert bench.photograph.view._picture is not None
-    assert bench.do(lambda: bench.photograph._photo.take("text.jpg", b"no picture")) == ""
-    assert "text" in bench.do(bench.photograph._read)
+    assert photograph.upload("Upload: photograph", "my pile.JPG", content) == ""
+    assert photograph.pictures == []
+    assert photograph.press("Read the angle") == ""
+    assert "explorer measure" in photograph.text
+    assert len(photograph.pictures) == 1
+    assert photograph.upload("Upload: photograph", "text.jpg", b"no picture") == ""
+    assert "text" in photograph.press("Read the angle")
 
 
-def test_a_checkerboard_tells_the_lens_of_a_photograph(bench, tmp_path):
-    panel = bench.photograph
+def test_a_checkerboard_tells_the_lens_of_a_photograph(photograph, tmp_path):
     pile = save(tmp_path / "pile.png", staged(Stage(30.0, fill=0.8, lens=0.1), replace(LOOK, tilt_deg=3.0)))
     board = save(tmp_path / "board.png", checkerboard(0.1))
-    for slot, file in ((panel._photo, pile), (panel._board, board)):
-        assert bench.do(lambda slot=slot, file=file: slot.take(file.name, file.read_bytes())) == ""
-    assert bench.do(panel._read) == ""
-    said = unescape(text_of(panel.view)).replace("\u00a0", " ")
-    k, low, high = map(float, re.search(r"lens k</th><td[^>]*>(\S+) \(95 % (\S+) … (\S+)\): pincushion", said).groups())
+    for slot, file in (("Upload: photograph", pile), ("Upload: checkerboard", board)):
+        assert photograph.upload(slot, file.name, file.read_bytes()) == ""
+    assert photograph.press("Read the angle") == ""
+    said = photograph.text
+    k, low, high = map(float, re.search(r"lens k (\S+) \(95 % (\S+) … (\S+)\): pincushion", said).groups())
     assert low < k < high
     assert (k, high - k) == (pytest.approx(0.1, abs=0.003), pytest.approx(0.0, abs=0.006))
     assert "48; they miss a plane board by 0." in said
     assert "bends the base line" not in said
-    words = shlex.split(panel.view._answer.command)
-    assert float(re.search(r"angle of repose</th><td[^>]*>(\S+)°", said)[1]) == pytest.approx(30.0, abs=0.5)
+    words = shlex.split(command_in(photograph))
+    assert float(re.search(r"angle of repose (\S+)°", said)[1]) == pytest.approx(30.0, abs=0.5)
     repeated = explorer(*words[1:])
     assert f"k = {k:+.4f}" in repeated.stdout
     # Without one, the base line, which passes the picture's middle here, tells nothing.
-    panel._board._choice.value = NO_BOARD
-    assert bench.do(panel._read) == ""
-    assert "lens k" not in text_of(panel.view)
-    assert "--checkerboard" not in panel.view._answer.command
+    photograph.enter("Checkerboard", NO_BOARD)
+    assert photograph.press("Read the angle") == ""
+    assert "lens k" not in photograph.text
+    assert "--checkerboard" not in command_in(photograph)
 
 
-def test_what_is_no_checkerboard_is_refused_in_a_line(bench):
-    panel = bench.photograph
+def command_in(person):
+    """The command line that an answer ends with."""
+    return unescape(re.search(r"On the command line:<code[^>]*>(.*?)</code>", person.html, re.DOTALL)[1])
+
+
+def test_what_is_no_checkerboard_is_refused_in_a_line(photograph):
     content = asset_path("photographs", "cone_25_30").read_bytes()
-    assert bench.do(lambda: panel._board.take("board.jpg", content)) == ""
-    line = bench.do(panel._read)
+    assert photograph.upload("Upload: checkerboard", "board.jpg", content) == ""
+    line = photograph.press("Read the angle")
     assert "no checkerboard" in line
     assert "\n" not in line
-    assert panel._shown is None
+    assert "On the command line" not in photograph.text
 
 
-def test_an_example_comes_with_its_scale_and_ones_own_photograph_with_what_was_entered(bench):
-    panel = bench.photograph
+def test_an_example_comes_with_its_scale_and_ones_own_photograph_with_what_was_entered(photograph):
+    def lengths():
+        return photograph.value("Scale [mm per pixel]"), photograph.value("Reference bar [mm]")
 
-    def choose(name):
-        event(panel._photo._choice, name)
-        assert finished(bench.actions, bench.background) == ""
-        return panel._scale.value, panel._bar.value, panel._ruler_said.content
-
-    assert (panel._scale.value, panel._bar.value) == (0.0, 100.0)
-    assert "its bar is 100 mm long" in panel._ruler_said.content
-    scale, bar, said = choose("trefoil_2_fit_1")
-    assert (scale, bar) == (0.2, 0.0)
-    assert "a pixel of it is 0.2 mm" in said
+    assert lengths() == (0.0, 100.0)
+    assert "its bar is 100 mm long" in photograph.text
+    assert photograph.enter("Photograph", "trefoil_2_fit_1") == ""
+    assert lengths() == (0.2, 0.0)
+    assert "a pixel of it is 0.2 mm" in photograph.text
     # The scale of an example is no one's own.
-    assert bench.do(lambda: panel._photo.take("mine.jpg", b"a picture")) == ""
-    assert (panel._scale.value, panel._bar.value) == (0.0, 0.0)
-    assert "lengths stay in pixels" in panel._ruler_said.content
-    panel._scale.value = 0.35
-    assert bench.do(lambda: panel._photo.take("another.jpg", b"another picture")) == ""
-    assert panel._scale.value == 0.35
-    assert choose("cone_25_30")[:2] == (0.0, 100.0)
+    assert photograph.upload("Upload: photograph", "mine.jpg", b"a picture") == ""
+    assert lengths() == (0.0, 0.0)
+    assert "lengths stay in pixels" in photograph.text
+    photograph.enter("Scale [mm per pixel]", 0.35)
+    assert photograph.upload("Upload: photograph", "another.jpg", b"another picture") == ""
+    assert lengths()[0] == 0.35
+    photograph.enter("Photograph", "cone_25_30")
+    assert lengths() == (0.0, 100.0)
 
 
-def test_a_rig_shows_its_own_parameters_and_the_bodies_that_are_poured(bench):
-    panel = bench.rig
-    assert {"rig.tilt_rate", "rig.body"} == set(panel._inputs)
-    bench.choose_rig("drop_plate_45")
-    assert {"rig.drop_height", "rig.specimen", "rig.drops", "rig.body"} == set(panel._inputs)
+def test_a_rig_shows_its_own_parameters_and_the_bodies_that_are_poured(room):
+    rig = room.at(RigPanel)
+    own = ["Tilt rate [deg/s]", "Body"]
+    assert rig.labels[: len(own) + 2] == ["Rig", *own, "Run"]
+    assert rig.enter("Rig", "drop_plate_45") == ""
+    own = ["Drop height [mm]", "Specimen", "Drops", "Body"]
+    assert rig.labels[: len(own) + 2] == ["Rig", *own, "Run"]
     other = material_source("nine_sphere_seed")
-    bench.session.start(other.scene, 1, other)
-    panel.show(Now(bench.session.now))
-    assert panel._inputs["rig.body"].options == tuple(body.name for body in other.scene.bodies)
+    room.session.start(other.scene, 1, other)
+    room.show(RigPanel)
+    assert rig.options("Body") == tuple(body.name for body in other.scene.bodies)
 
 
-def test_a_rig_is_run_with_what_is_on_the_screen(bench, monkeypatch):
+def test_a_rig_is_run_with_what_is_on_the_screen(room, monkeypatch):
     asked = {}
 
     def answered(scene, rig, values, seed, folder):
@@ -384,13 +390,14 @@ def test_a_rig_is_run_with_what_is_on_the_screen(bench, monkeypatch):
         return CommandResult("0.62 for 0.62", "explorer simulate drop_plate_45")
 
     monkeypatch.setattr("explorer.viewer.laboratory.rig_panel.rig_result", answered)
-    bench.choose_rig("drop_plate_45")
-    bench.rig._inputs["rig.drop_height"].value = 300.0
-    bench.rig._inputs["rig.body"].value = "petiole"
-    assert bench.do(bench.rig._run) == ""
-    assert (asked["rig"], asked["rig.body"], asked["scene"]) == ("drop_plate_45", "petiole", bench.session.now.scene)
+    rig = room.at(RigPanel)
+    rig.enter("Rig", "drop_plate_45")
+    rig.enter("Drop height [mm]", 300.0)
+    rig.enter("Body", "petiole")
+    assert rig.press("Run") == ""
+    assert (asked["rig"], asked["rig.body"], asked["scene"]) == ("drop_plate_45", "petiole", room.session.now.scene)
     assert asked["rig.drop_height"] == pytest.approx(0.3)
-    assert "0.62 for 0.62" in text_of(bench.rig.view)
+    assert "0.62 for 0.62" in rig.text
 
 
 def test_a_bench_test_is_repeated_on_the_solver_with_the_material_that_is_poured(bench, monkeypatch):
@@ -398,19 +405,19 @@ def test_a_bench_test_is_repeated_on_the_solver_with_the_material_that_is_poured
     monkeypatch.setattr(
         "explorer.viewer.laboratory.bench_panel.twin_result", lambda order: asked.append(order) or CommandResult("", "")
     )
-    bench.bench._test.value = "drop"
-    bench.bench._readings.offer(("drop",))
-    bench.bench._twin.value = True
-    assert bench.do(bench.bench._evaluate) == ""
-    bench.bench._twin.value, bench.bench._bias.value = False, True
-    assert bench.do(bench.bench._evaluate) == ""
+    bench.enter("Test", "drop")
+    bench.enter("Repeat it on the solver", True)
+    assert bench.press("Evaluate") == ""
+    bench.enter("Repeat it on the solver", False)
+    bench.enter("Where the formula misses", True)
+    assert bench.press("Evaluate") == ""
     assert [(one.simulate, one.bias, one.material) for one in asked] == [
         (True, False, "sunflower_extract"),
         (False, True, None),
     ]
 
 
-def test_a_photograph_is_compared_with_what_is_poured(bench, monkeypatch):
+def test_a_photograph_is_compared_with_what_is_poured(room, photograph, monkeypatch):
     asked = []
 
     def answered(read, scene, folder):
@@ -418,9 +425,9 @@ def test_a_photograph_is_compared_with_what_is_poured(bench, monkeypatch):
         return CommandResult("beside", "explorer measure")
 
     monkeypatch.setattr("explorer.viewer.laboratory.photograph_panel.compared_result", answered)
-    bench.photograph._bar.value = 100.0
-    assert bench.do(bench.photograph._compare) == ""
-    assert asked == [(bench.photograph._photo.chosen, 100.0, bench.session.now.scene)]
+    photograph.enter("Reference bar [mm]", 100.0)
+    assert photograph.press("Read it beside a pour") == ""
+    assert asked == [(photograph.value("Photograph"), 100.0, room.session.now.scene)]
 
 
 @pytest.mark.parametrize(("entered", "length"), [(0.0, None), (0.2, 0.2), (float("nan"), None), ("wide", None)])
@@ -428,60 +435,62 @@ def test_a_length_of_nothing_is_none(entered, length):
     assert positive(entered) == length
 
 
-def test_a_sheet_is_made_and_a_filled_one_analysed(bench):
-    assert bench.do(bench.design._make) == ""
-    assert "explorer design box-behnken" in text_of(bench.design.view)
-    panel = bench.analysis
-    assert "every cell is empty" in bench.do(panel._analyse)  # what was made is chosen, and nobody has filled it in
-    panel._filled._choice.value = "sunflower_extract"
-    panel._target.value, panel._target_error.value = "24.68", "0.2"
-    assert bench.do(panel._analyse) == ""
-    assert "--target 24.68 --target-error 0.2" in text_of(panel.view)
-    assert "Contours" in panel.view._plots._choice.options
-    panel._reduce.value, panel._model.value = "by AICc", "quadratic"
-    assert bench.do(panel._analyse) == ""
-    assert "--model quadratic --reduce aicc" in text_of(panel.view)
-    panel._terms.value = "A, B"
-    assert "stands instead of --model" in bench.do(panel._analyse)
-    panel._terms.value, panel._target.value = "", "steep"
-    assert "target 'steep'" in bench.do(panel._analyse)
-    panel._target.value, panel._target_error.value = "24.68", "-1"
-    assert "allowed: 0 and more" in bench.do(panel._analyse)
-    panel._target.value, panel._target_error.value, panel._block.value = "", "", "shift"
-    assert "--block shift: no column of blocks" in bench.do(panel._analyse)
+def test_a_sheet_is_made_and_a_filled_one_analysed(design, analysis):
+    assert design.press("Make the sheet") == ""
+    assert "explorer design box-behnken" in design.text
+
+    def analysed(**entered):
+        for label, value in entered.items():
+            analysis.enter(label.replace("_", " "), value)
+        return analysis.press("Analyse")
+
+    assert "every cell is empty" in analysed()  # what was made is chosen, and nobody has filled it in
+    error = "Standard_error_of_the_target"
+    assert analysed(Sheet="sunflower_extract", Target="24.68", **{error: "0.2"}) == ""
+    assert "--target 24.68 --target-error 0.2" in analysis.text
+    assert "Contours" in analysis.options("Chart of it")
+    assert analysed(Drop_terms="by AICc", Model="quadratic") == ""
+    assert "--model quadratic --reduce aicc" in analysis.text
+    assert "stands instead of --model" in analysed(Terms="A, B")
+    assert "target 'steep'" in analysed(Terms="", Target="steep")
+    assert "allowed: 0 and more" in analysed(Target="24.68", **{error: "-1"})
+    assert "--block shift: no column of blocks" in analysed(Target="", Block="shift", **{error: ""})
 
 
-def test_an_audit_of_the_shipped_article_and_of_an_archive(bench):
+def test_an_audit_of_the_shipped_article_and_of_an_archive(room):
+    audit = room.at(AuditPanel)
     folder = asset_path("source_tables", "table1_physical").parent
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w") as archive:
         for file in folder.iterdir():
             archive.write(file, f"mine/{file.name}")
-    assert bench.do(lambda: bench.audit._audit("mine.zip", packed.getvalue())) == ""
-    assert "141 reproduced exactly" in text_of(bench.audit.view)
-    assert "cannot be unpacked" in bench.do(lambda: bench.audit._audit("mine.zip", b"nothing"))
-    assert "141 reproduced exactly" in text_of(bench.audit.view)
+    assert audit.upload("Upload tables and audit", "mine.zip", packed.getvalue()) == ""
+    assert "141 reproduced exactly" in audit.text
+    assert "cannot be unpacked" in audit.upload("Upload tables and audit", "mine.zip", b"nothing")
+    assert "141 reproduced exactly" in audit.text
 
 
-def test_text_from_files_is_shown_as_text(bench):
-    slot = bench.bench._readings
+def test_names_in_files_that_would_be_marks_on_the_page_are_refused(bench, analysis):
     readings = b"a,b,replicate,angle_deg\n" + b"".join(b"<b>x</b>,y,%d,%d.0\n" % (k, 20 + k) for k in range(4))
-    assert bench.do(lambda: slot.take("mine.csv", readings)) == ""
-    bench.bench._test.value = "inclined_plane"
-    bench.do(bench.bench._evaluate)
-    assert "<b>x" not in text_of(bench.bench.view)
+    bench.enter("Test", "inclined_plane")
+    assert bench.upload("Upload: readings", "mine.csv", readings) == ""
+    assert "'<b>x</b>'; allowed: letters, digits" in bench.press("Evaluate")
+    assert "<b>x" not in bench.html
+    sheet = asset_path("runs", "sunflower_extract").read_text(encoding="utf-8")
+    named = sheet.replace("angle_of_repose_deg", "<b>x</b>")
+    assert analysis.upload("Upload: sheet", "mine.csv", named.encode()) == ""
+    assert "no < > & or quotes" in analysis.press("Analyse")
+    assert "<b>x" not in analysis.html
 
 
-def test_the_tab_tells_what_is_done_and_what_was_refused(server, tmp_path):
-    actions = Actions()
-    session = PageSession(material_source("sunflower_extract"))
-    tab = LaboratoryPanel(page_context(server, session, actions.post, tmp_path))
-    tab.show(Now(session.now, notice="mine.csv: line 2: <steep>"))
-    assert "&lt;steep&gt;" in tab._state.content
-    tab._background.start("auditing", lambda: None, lambda _: None)
-    tab.show(Now(session.now))
-    assert "Busy auditing" in tab._state.content
-    finished(actions, tab._background)
+def test_the_tab_tells_what_is_done_and_what_was_refused(room):
+    tab = room.at(LaboratoryPanel)
+    room.show(LaboratoryPanel, "mine.csv: line 2: <steep>")
+    assert "&lt;steep&gt;" in tab.html
+    room.page.bench_work.start("auditing", lambda: None, lambda _: None)
+    room.show(LaboratoryPanel)
+    assert "Busy auditing" in tab.text
+    finished(room.actions, room.page.bench_work)
 
 
 def test_a_command_line_is_selected_as_a_whole():
@@ -505,86 +514,86 @@ def test_a_command_line_is_selected_as_a_whole():
 
 
 def test_another_test_offers_its_own_example(bench):
-    event(bench.bench._test, "drop")
-    assert finished(bench.actions, bench.background) == ""
-    assert bench.bench._readings.chosen == "drop"
-    event(bench.bench._readings.upload, UploadedFile("mine.csv", b"x"))
-    finished(bench.actions, bench.background)
-    assert bench.bench._readings.chosen.endswith(".csv")
-    event(bench.bench._test, "shear")
-    finished(bench.actions, bench.background)
-    assert bench.bench._readings.chosen.endswith(".csv")  # what was sent stays chosen
+    assert bench.enter("Test", "drop") == ""
+    assert bench.value("Readings") == "drop"
+    bench.upload("Upload: readings", "mine.csv", b"x")
+    assert bench.value("Readings").endswith(".csv")
+    bench.enter("Test", "shear")
+    assert bench.value("Readings").endswith(".csv")  # what was sent stays chosen
 
 
-def test_reports_of_the_laboratory_and_of_commands_are_in_the_room_of_reports(bench, tmp_path):
-    bench.reports.show(Now(bench.session.now))
-    assert bench.reports._list.options == (NONE,)
-    bench.analysis._analyse()
-    assert finished(bench.actions, bench.background) == ""
-    (folder,) = bench.page.project.laboratory.iterdir()
-    assert folder.name in text_of(bench.analysis.view)
-    bench.reports.show(Now(bench.session.now))
-    assert bench.reports._list.options == (folder.name,)
-    address = bench.reports._frame.content.split('href="')[1].split('"')[0]
-    assert bench.page.pages.page(address).body == (folder / "report.html").read_bytes()
+def test_reports_of_the_laboratory_and_of_commands_are_in_the_room_of_reports(room, analysis, tmp_path):
+    reports = room.at(ReportsPanel)
+    room.show(ReportsPanel)
+    assert reports.options("Report") == (NONE,)
+    assert analysis.press("Analyse") == ""
+    (folder,) = room.page.project.laboratory.iterdir()
+    assert folder.name in analysis.text
+    room.show(ReportsPanel)
+    assert reports.options("Report") == (folder.name,)
+    address = reports.html.split('href="')[1].split('"')[0]
+    assert room.page.pages.page(address).body == (folder / "report.html").read_bytes()
     # Beside a project's file, where its commands leave their folders.
     own = tmp_path / "lentils"
     (own / "audit_2").mkdir(parents=True)
     (own / "audit_2" / "report.html").write_text("<p>an audit</p>")
-    project = replace(bench.page.project, folder=own)
+    project = replace(room.page.project, folder=own)
     assert [one.name for one in project.reports] == ["audit_2", folder.name]
 
 
-def test_measured_data_become_a_choice_of_the_diagnosis(bench, tmp_path):
+def test_measured_data_become_a_choice_of_the_diagnosis(room, tmp_path):
     """Angles, then a balance's curves of another set-up: the folder is that of the command line that is shown."""
-    panel, uploads = bench.data, bench.page.uploads
-    panel._set.value, panel._angles.value = "lot_7", "24.1, 25.0, 26.2"
-    panel._changes.value = "rig.outlet_height=60mm"
-    assert bench.do(panel._save) == ""
+    data, uploads = room.at(MeasuredDataPanel), room.page.uploads
+    data.enter("Data set", "lot_7")
+    data.enter("Angles [°]", "24.1, 25.0, 26.2")
+    data.enter("Set-up", "rig.outlet_height=60mm")
+    assert data.press("Save the data") == ""
     assert kept_measurements(uploads) == {"lot_7": uploads / "lot_7"}
     (first,) = load_measurement(uploads / "lot_7").fit
     assert first.offered["angle_of_repose_deg"].values.tolist() == [24.1, 25.0, 26.2]
-    shown = html.unescape(text_of(panel.view))
-    assert "role: A is fitted" in shown
-    assert "In the list of Diagnose: lot_7." in shown
+    assert "role: A is fitted" in data.text
+    assert "In the list of Diagnose: lot_7." in data.text
     assert "lot_7" in DiagnosisPanel._offered(SimpleNamespace(_shipped=(), _uploads=uploads))
     # The same again by the command line.
-    command = re.search(r"(explorer new measurement .*?)</code>", shown)[1]
-    words = shlex.split(command)[1:]
+    words = shlex.split(command_in(data))[1:]
     words[words.index("--out") + 1] = str(tmp_path / "again")
     assert explorer(*words).exit_code == 0
     again = (tmp_path / "again/lot_7/measurement.toml").read_text(encoding="utf-8")
     assert again == (uploads / "lot_7/measurement.toml").read_text(encoding="utf-8")
-    panel._condition.value, panel._angles.value, panel._starts.value = "B", "", f"{BEGINS}, {BEGINS}"
-    panel._changes.value = f"rig.mass={MASS}"
+    data.enter("Set-up's name", "B")
+    data.enter("Angles [°]", "")
+    data.enter("Flow began at [s]", f"{BEGINS}, {BEGINS}")
+    data.enter("Set-up", f"rig.mass={MASS}")
     time = np.arange(0.0, 8.0, 0.05)
     for k in range(2):
         content = write(tmp_path / "b.csv", time, steady(time) + 1e-6 * k * time).read_bytes()
-        event(panel.uploads[BALANCES], UploadedFile(f"b{k}.csv", content))
-        finished(bench.actions, bench.background)
-    assert panel._kept.content.count(".csv") == 2
-    assert bench.do(panel._save) == ""
+        assert data.upload(BALANCES.label, f"b{k}.csv", content) == ""
+    assert re.search(r"balance: b0-\w+\.csv, b1-\w+\.csv(?=<)", data.html)
+    assert data.press("Save the data") == ""
     measurement = load_measurement(uploads / "lot_7")
     assert [(one.name, one.role) for one in measurement.conditions] == [("A", "holdout"), ("B", "fit")]
-    assert NOTHING in panel._kept.content
+    assert NOTHING in data.html
 
 
-def test_measured_data_that_do_not_fit_are_refused_in_one_line(bench):
-    panel, uploads = bench.data, bench.page.uploads
-    assert "nothing was measured: give --photo" in bench.do(panel._save)
-    panel._angles.value = "angles.csv"
-    assert "a file of them goes by the command line" in bench.do(panel._save)
-    panel._angles.value, panel._set.value = "24,25", "../lot"
-    assert "letters, digits" in bench.do(panel._save)
-    panel._set.value, panel._changes.value = "lot", "rig.mass=12g rig.mesh=/etc/passwd"
-    assert "rig.mesh: allowed: the study's own" in bench.do(panel._save)
-    panel._changes.value, panel._lag.value = "", "long"
-    assert "Lag of the balance 'long'" in bench.do(panel._save)
-    event(panel.uploads[PHOTOGRAPHS], UploadedFile("a.jpg", b"no picture"))
-    finished(bench.actions, bench.background)
-    panel._lag.value = ""
-    assert "a-" in bench.do(panel._save)
-    assert "a-" in panel._kept.content
-    bench.do(panel._forget)
-    assert NOTHING in panel._kept.content
+LABELS = {"angles": "Angles [°]", "name": "Data set", "set_up": "Set-up", "lag": "Lag of the balance [s]"}
+
+
+def test_measured_data_that_do_not_fit_are_refused_in_one_line(room):
+    data, uploads = room.at(MeasuredDataPanel), room.page.uploads
+
+    def refused(**entered):
+        for label, value in entered.items():
+            data.enter(LABELS[label], value)
+        return data.press("Save the data")
+
+    assert "nothing was measured: give --photo" in refused()
+    assert "a file of them goes by the command line" in refused(angles="angles.csv")
+    assert "letters, digits" in refused(angles="24,25", name="../lot")
+    assert "rig.mesh: allowed: the study's own" in refused(name="lot", set_up="rig.mass=12g rig.mesh=/etc/passwd")
+    assert "Lag of the balance 'long'" in refused(set_up="", lag="long")
+    data.upload(PHOTOGRAPHS.label, "a.jpg", b"no picture")
+    assert "a-" in refused(lag="")
+    assert "a-" in data.html
+    data.press("Take the files off")
+    assert NOTHING in data.html
     assert kept_measurements(uploads) == {}
