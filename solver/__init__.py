@@ -52,6 +52,7 @@ from solver.scenes.material_file import (
 )
 from solver.scenes.scene import (
     Scene,
+    actual,
     body_counts,
     canonical,
     parameters,
@@ -196,6 +197,7 @@ __all__ = [
     "Vector",
     "Whole",
     "WorkerPool",
+    "actual",
     "all_names",
     "asset_path",
     "begin_worker",

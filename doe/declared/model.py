@@ -122,10 +122,11 @@ class Declared(Record):
 def declare(measurement: Measurement, effects: Sequence[str]) -> Declared:
     """The declared model: parameters, effects with their widest ranges, fitted conditions.
 
-    Effects that a contact law does not go with are no candidates.
+    Effects that a contact law does not go with are no candidates, and none whose amplitude is a parameter.
     """
     scenes = [condition.scene for condition in measurement.conditions]
-    effects = [name for name in effects if all(scene.contact.carries(name) for scene in scenes)]
+    known = {effect_of(p.path) for p in measurement.parameters}
+    effects = [name for name in effects if name not in known and all(scene.contact.carries(name) for scene in scenes)]
     return Declared(
         tuple(box_of(p) for p in measurement.parameters),
         tuple(widest(name, scenes) for name in effects),
@@ -146,9 +147,23 @@ def widest(name: str, scenes: Sequence[Scene]) -> CandidateEffect:
 
 def effect_values(effect: str, amplitude: Sequence[float], turned: bool = False) -> dict[str, float]:
     """Parameter path → value of an effect's amplitudes; ``turned``: in a rig that is turned by 180° on its bench."""
-    kind = EFFECTS[effect]
-    sign = -1.0 if turned and kind.on_bench else 1.0
-    return {f"effect.{effect}.{name}": sign * one for name, one in zip(kind.amplitudes, amplitude, strict=True)}
+    paths = (f"effect.{effect}.{name}" for name in EFFECTS[effect].amplitudes)
+    return {path: in_rig_frame(path, one, turned) for path, one in zip(paths, amplitude, strict=True)}
+
+
+def in_rig_frame(path: str, amplitude: float, turned: bool) -> float:
+    """The value of the parameter ``path`` as the rig sees it: in a rig that is ``turned`` by 180° on its bench, what
+    stays with the bench acts the other way.
+    """
+    effect = effect_of(path)
+    return -amplitude if turned and effect and EFFECTS[effect].on_bench else amplitude
+
+
+def effect_of(path: str) -> str:
+    """The effect of which the parameter ``path`` is an amplitude; "" of any other parameter."""
+    kind, _, rest = path.partition(".")
+    name, _, field = rest.partition(".")
+    return name if kind == "effect" and name in EFFECTS and field in EFFECTS[name].amplitudes else ""
 
 
 def possible(scene: Scene, name: str, amplitude: tuple[float, ...]) -> bool:

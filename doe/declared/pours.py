@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from doe.declared.model import effect_values
+from doe.declared.model import effect_values, in_rig_frame
 from doe.declared.points import AS_IT_IS, Point, View
 from doe.measurement.features import feature_set, features_of_record
 from doe.measurement.measurement import Condition, Observation
@@ -197,9 +197,12 @@ class ModelPours:
 
     def scene(self, point: Point, condition: int) -> Scene:
         """The scene of ``point`` in a condition."""
-        values: dict[str, float | str] = dict(zip(self._paths, point.theta, strict=True))
+        turned = self._conditions[condition].turned
+        values: dict[str, float | str] = {
+            path: in_rig_frame(path, one, turned) for path, one in zip(self._paths, point.theta, strict=True)
+        }
         for effect, amplitude in point.effects:
-            values |= effect_values(effect, amplitude, self._conditions[condition].turned)
+            values |= effect_values(effect, amplitude, turned)
         return with_values(self._conditions[condition].scene, values)
 
     def seed(self, point: Point, condition: int) -> int:

@@ -27,7 +27,7 @@ from doe.errors import StatisticsError
 from doe.measurement.measurement import Condition
 from doe.measurement.sight import PERFECT, Sight
 from doe.measurement.summaries import summary_names
-from solver import Scene, pour_rig
+from solver import Scene, actual, pour_rig
 
 FloatArray = npt.NDArray[np.float64]
 Say = Callable[[str], None]
@@ -81,7 +81,7 @@ class TrainingPours:
         self._rows: dict[Point, list[PointPour]] = {}
         self._tried: list[tuple[Direction, float, list[Point]]] = []
         self._directions = [one for effect in declared.effects for one in directions_of(effect)]
-        self._turned = all(_turns(condition.scene) for condition in conditions)
+        self._turned = all(unchanged_by_a_quarter_turn(condition.scene) for condition in conditions)
         self._heaps = all(pour_rig(condition.scene).leaves_heap for condition in conditions)
         base = base_points(declared, budget.base)
         self._keep(base, pours.run("base model", base), -1, 0.0)
@@ -411,9 +411,10 @@ def _instrument(
     return Instrument(bias, np.array(axis))
 
 
-def _turns(scene: Scene) -> bool:
+def unchanged_by_a_quarter_turn(scene: Scene) -> bool:
     """Whether a quarter turn leaves the declared ``scene`` as it is."""
-    return pour_rig(scene).quarter_turns and scene.gravity[0] == scene.gravity[1] == 0.0 and not any(scene.axis)
+    found = actual(scene)
+    return pour_rig(found).quarter_turns and found.gravity[0] == found.gravity[1] == 0.0 and not any(found.axis)
 
 
 def _words(direction: Direction, share: float) -> str:

@@ -259,12 +259,14 @@ class Answers:
         )
         return Judged(row, suggestion)
 
-    def followed_up(self, truth: Truth, asked: Suggestion, scanner: Scanner | None) -> Measurement | None:
+    def followed_up(
+        self, truth: Truth, asked: Suggestion, scanner: Scanner | None, occasion: str = "next"
+    ) -> Measurement | None:
         """What the laboratory measures in the set-up that it is asked for; None where its pours keep breaking off."""
         place = next(c for c, one in enumerate(self.measurement.conditions) if one.name == asked.condition)
         condition = self.measurement.conditions[place]
         changed = replace(as_suggested(condition, asked), name=condition.name)
-        data = self.measured(truth, [changed], f" next {asked.experiment.name}", asked.pours)
+        data = self.measured(truth, [changed], f" {occasion} {asked.experiment.name}", asked.pours)
         if data is None:
             return None
         with TemporaryDirectory() as folder:

@@ -23,6 +23,9 @@ def diagnose(
     follow_up: Path | None = typer.Option(
         None, "--follow-up", metavar="DIR", help="The folder OUT/next of an ambiguous answer, filled in."
     ),
+    given: Path | None = typer.Option(
+        None, metavar="DIR", help="A finished diagnosis: with its effect in the model, what else is missing?"
+    ),
     author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
     notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
     apply: bool = typer.Option(False, "--apply", help="Also write the corrected material as OUT/corrected.toml."),
@@ -55,6 +58,7 @@ def diagnose(
         apply=apply,
         seed=seed,
         follow_up=follow_up,
+        given=given,
         author=author,
         notes=notes,
         record=record,

@@ -69,8 +69,12 @@ class NextFolder:
     measurement: Measurement
 
 
-def write_next(folder: Path, source: Path, measurement: Measurement, suggestion: Suggestion) -> None:
+def write_next(
+    folder: Path, source: Path, measurement: Measurement, suggestion: Suggestion, given: Path | None = None
+) -> None:
     """Write ``suggestion``, a change of a condition of ``measurement`` as read from ``source``, to the new ``folder``.
+
+    ``given``: the finished diagnosis that the command which takes it is to name as well.
 
     Raises CommandError in one line for a folder that is not empty, and for a change that no condition can state.
     """
@@ -81,13 +85,13 @@ def write_next(folder: Path, source: Path, measurement: Measurement, suggestion:
         raise CommandError(f"{folder}: is not empty; allowed: a folder that is new or empty")
     table = read_toml(source / FILE)
     condition = next(one for one in measurement.conditions if one.name == suggestion.condition)
-    given = next(one for one in table["condition"] if one["name"] == condition.name)
+    stated = next(one for one in table["condition"] if one["name"] == condition.name)
     name, change = _free_name(suggestion, measurement), suggestion.experiment.name
     changed = as_suggested(condition, suggestion).scene
-    entry = _changed_entry(given, name, measurement, suggestion, changed)
+    entry = _changed_entry(stated, name, measurement, suggestion, changed)
     title = f"{measurement.title or source.name}: follow-up, {change}"
     folder.mkdir(parents=True, exist_ok=True)
-    material = copied_material(str(given.get("material", table["material"])), source, folder)
+    material = copied_material(str(stated.get("material", table["material"])), source, folder)
     top = {"format": 1, "title": title, "material": material}
     tables = {"parameters": _parameters(table, measurement), "uncertainty": _uncertainty(table, condition)}
     write_whole(folder / FILE, measurement_toml(top, tables, entry))
@@ -100,7 +104,7 @@ def write_next(folder: Path, source: Path, measurement: Measurement, suggestion:
     drawing = setup_svg(changed, suggestion.values)
     if drawing:
         write_whole(folder / "setup.svg", drawing)
-    write_whole(folder / "README.md", _readme(folder, source, measurement, suggestion, name))
+    write_whole(folder / "README.md", _readme(folder, source, measurement, suggestion, name, given))
     order = {"schema": SCHEMA, "rivals": suggestion.rivals, "change": change, "values": suggestion.values}
     order |= {"turned": suggestion.turned, "condition": condition.name, "source": str(source.absolute())}
     write_whole(folder / ORDER, json.dumps(plain(order), ensure_ascii=False, indent=1) + "\n")
@@ -300,7 +304,9 @@ def _empty_table(condition: Condition, pours: int) -> str:
 # For people
 
 
-def _readme(folder: Path, source: Path, measurement: Measurement, suggestion: Suggestion, name: str) -> str:
+def _readme(
+    folder: Path, source: Path, measurement: Measurement, suggestion: Suggestion, name: str, given: Path | None
+) -> str:
     experiment, pours = suggestion.experiment, suggestion.pours
     condition = next(one for one in measurement.conditions if one.name == suggestion.condition)
     title = code(" ".join((measurement.title or source.name).split()))
@@ -315,6 +321,7 @@ def _readme(folder: Path, source: Path, measurement: Measurement, suggestion: Su
     if any(one.origin == "photographs" for one in condition.observations):
         more += f', or name photographs under `[[condition]]` in `{FILE}`: `images = ["…"]`'
     command = ["explorer", "diagnose", str(source.absolute()), "--follow-up", str(folder.absolute())]
+    command += [] if given is None else ["--given", str(given.absolute())]
     # The folder of the first diagnosis is not empty any more.
     command += ["--out", f"{folder.absolute().parent}_with_follow_up"]
     return f"""# To be measured next: {experiment.name}

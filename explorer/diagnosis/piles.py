@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from doe.declared.given import with_given
 from doe.declared.model import effect_values
 from doe.diagnose.result import CalibratedModel
 from doe.measurement.load import load_measurement
@@ -54,7 +55,7 @@ class AnswerPiles:
 def answer_piles(result: DiagnosisResult) -> AnswerPiles:
     """The piles of the first fitted condition. Raises a ValueError where the data are not there any more."""
     try:
-        measurement = load_measurement(measurement_folder(result.data.folder))
+        measurement = with_given(load_measurement(measurement_folder(result.data.folder)), result.given)
     except AssetNotFoundError:
         text = f"{result.data.folder}: the measured data of this diagnosis are not there any more"
         raise CommandError(text) from None

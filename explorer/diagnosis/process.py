@@ -26,17 +26,21 @@ from solver import EFFECTS
 from solver.assets import measurement_folder
 
 RESULT = DiagnosisResult.NAME
+FURTHER = "-further"
+"""Behind the data's name in that of an output folder: of a diagnosis that goes on from another one."""
 
 
 @dataclass(frozen=True)
 class Question:
     """What a diagnosis is asked. ``data``: folder of measured data, or a shipped name; ``effects``: the candidates, all
-    if empty; ``budget``: about so many pours for the emulator, None for as many as the program takes by itself.
+    if empty; ``budget``: about so many pours for the emulator, None for as many as the program takes by itself;
+    ``given``: folder of a finished diagnosis whose effect is in the model, "" for none.
     """
 
     data: str
     effects: tuple[str, ...] = ()
     budget: int | None = None
+    given: str = ""
 
 
 class DiagnosisProcess(Protocol):
@@ -157,7 +161,8 @@ class DiagnoseProcess:
         return finished(self._folder, RESULT)
 
     def _begin(self, question: Question) -> None:
-        out = new_folder(self._folder, Path(question.data).name)
+        # One that goes on from another is not resumed by its data's name; asked again, it finds its pours in the store.
+        out = new_folder(self._folder, Path(question.data).name + (FURTHER if question.given else ""))
         self._process.start(out, self._arguments(question, out))
         self._line.begun()
 
@@ -166,7 +171,8 @@ class DiagnoseProcess:
         store = () if self.store is None else ("--store", str(self.store))
         effects = ("--effects", ",".join(question.effects)) if question.effects else ()
         budget = () if question.budget is None else ("--budget", str(question.budget))
-        asked = (*effects, *budget, *store, *self._place.arguments)
+        given = ("--given", question.given) if question.given else ()
+        asked = (*effects, *budget, *given, *store, *self._place.arguments)
         return ["diagnose", question.data, "--out", str(out), "--apply", *asked]
 
 
@@ -187,4 +193,5 @@ def _checked(question: Question) -> Question:
 def _in_words(question: Question) -> str:
     few = f", {len(question.effects)} effects" if question.effects else ""
     pours = "" if question.budget is None else f", about {question.budget} pours"
-    return f"{Path(question.data).name}{few}{pours}"
+    given = f", going on from {Path(question.given).name}" if question.given else ""
+    return f"{Path(question.data).name}{few}{pours}{given}"

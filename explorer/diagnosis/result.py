@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 import numpy.typing as npt
 
-from doe.declared.model import CandidateEffect
+from doe.declared.model import CandidateEffect, effect_values
 from doe.diagnose.result import (
     BASE,
     NO_EFFECT,
@@ -152,13 +152,14 @@ class DataRead(Record):
 
 @dataclass(frozen=True)
 class DiagnosisOrder(Record):
-    """What was asked for; no effects: all of them."""
+    """What was asked for; no effects: all of them. ``given``: folder of the diagnosis that this one goes on from."""
 
     out: str
     effects: tuple[str, ...]
     budget: int | None
     seed: int
     follow_up: str | None
+    given: str | None = None
 
 
 @dataclass(frozen=True)
@@ -237,6 +238,9 @@ class DiagnosisResult(Document):
     timing: Duration
     versions: dict[str, str | None]
     about: About = field(default_factory=About)
+    given: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    """Effects that the declared model holds by an earlier answer, with the amplitudes [natural units] about which they
+    were calibrated here (`doe.declared.given`)."""
 
     @property
     def kind(self) -> Kind:
@@ -267,6 +271,22 @@ class DiagnosisResult(Document):
     def effect_row(self, label: str) -> EffectRow | None:
         """Return the row of an effect or a pair; None where it has none."""
         return next((row for row in self.effects if row.name == label), None)
+
+    def handed_on(self) -> dict[str, tuple[float, ...]]:
+        """Return what a further diagnosis has in its model, effect → amplitudes [natural units].
+
+        What was given here, as it was calibrated, and the most probable effect, also one of an answer that does not
+        fit; empty where it is not as probable as a name has to be.
+        """
+        best, p = self.ranked()[0]
+        row = self.effect_row(best)
+        if row is None or p < self.threshold:
+            return {}
+        after = {one.name: one.after for one in self.parameters}
+        found = {name: tuple(after[path] for path in effect_values(name, one)) for name, one in self.given.items()}
+        for name in best.split("+"):
+            found[name] = tuple(one.value for one in row.amplitudes if one.effect == name)
+        return found
 
     def range_of(self, effect: str) -> CandidateEffect:
         """Return the widest range of an effect's amplitudes."""

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from doe.declared.given import Given, with_given
 from doe.declared.pours import measured_profile
 from doe.diagnose.budget import Budget, scaled_budget
 from doe.diagnose.confirm import CONTRADICTED, Confirmed
@@ -28,6 +29,7 @@ from explorer.background.output_folder import kept_for_one, read_result
 from explorer.background.progress import PourProgress
 from explorer.background.reporter import Reporter
 from explorer.diagnosis.corrected import corrected_toml, study_toml
+from explorer.diagnosis.earlier import NOTHING_BEFORE, Earlier, earlier_answer
 from explorer.diagnosis.next_folder import read_next, write_next
 from explorer.diagnosis.result import (
     CORRECTED,
@@ -83,6 +85,8 @@ class DiagnoseOrder:
     apply: bool = False
     seed: int = 0
     follow_up: Path | None = None
+    given: Path | None = None
+    """Folder of a finished diagnosis whose effect is in the model."""
     author: str = ""
     notes: str = ""
     record: Path | None = None
@@ -111,22 +115,26 @@ def run_diagnose(order: DiagnoseOrder, reporter: Reporter) -> DiagnosisResult:
     if order.out.is_file() or (order.out.is_dir() and any(order.out.iterdir()) and not order.resume):
         raise CommandError(f"--out {order.out}: is not empty; name a new folder, or add --resume to go on there")
     asked = read_next(order.follow_up) if order.follow_up else None
+    earlier = earlier_answer(order.given) if order.given else NOTHING_BEFORE
     # The executor before anything is in the folder: perhaps no scheduler answers.
     with kept_for_one(order.out), executor(order.threads, order.scheduler) as pool:
         reporter.begin(order.out, order.resume)
-        return _run(order, measurement, asked.measurement if asked else None, pool, reporter)
+        return _run(order, measurement, asked.measurement if asked else None, earlier, pool, reporter)
 
 
 def _run(
     order: DiagnoseOrder,
     measurement: Measurement,
     follow_up: Measurement | None,
+    earlier: Earlier,
     pool: Executor,
     reporter: Reporter,
 ) -> DiagnosisResult:
     """Pour, judge and write into ``order.out``, which is there and this command's alone."""
     say, names = reporter.say, order.effects or tuple(EFFECTS)
-    path = order.store or default_store()
+    path, as_declared = order.store or default_store(), measurement
+    measurement = earlier.carried_into(measurement)
+    follow_up = None if follow_up is None else with_given(follow_up, earlier.given)
     budget = Budget()
     if order.budget is not None:
         budget = scaled_budget(order.budget, measurement, names)
@@ -146,7 +154,7 @@ def _run(
         found = run_diagnosis(
             measurement, store, pours, names, budget, progress.stage, progress.pour, order.seed, follow_up
         )
-    result = result_of(measurement, order, found, reporter.elapsed)
+    result = result_of(measurement, order, earlier.given, found, reporter.elapsed)
     text = json.dumps(result.to_dict(), ensure_ascii=False, allow_nan=False, indent=1)
     write_whole(order.out / result.NAME, text + "\n")
     reporter.result = order.out / result.NAME
@@ -155,7 +163,7 @@ def _run(
     if missing:
         say(missing)
     if found.suggestions:
-        write_next(order.out / "next", order.folder, measurement, found.suggestions[0])
+        write_next(order.out / "next", order.folder, as_declared, found.suggestions[0], order.given)
         say(f"{order.out}/next: what to measure next, to be filled in; then --follow-up {order.out}/next")
     if order.apply:
         write_whole(order.out / CORRECTED, corrected_toml(measurement, found))
@@ -178,7 +186,12 @@ def _finished(order: DiagnoseOrder) -> DiagnosisResult | None:
     if result is None:
         return None
     asked = DiagnosisOrder(
-        result.order.out, order.effects, order.budget, order.seed, str(order.follow_up) if order.follow_up else None
+        result.order.out,
+        order.effects,
+        order.budget,
+        order.seed,
+        str(order.follow_up) if order.follow_up else None,
+        str(order.given) if order.given else None,
     )
     usual = DiagnosisOrder(result.order.out, (), None, 0, None)
     if Path(result.data.folder).absolute() != order.folder.absolute() or asked not in (usual, result.order):
@@ -193,7 +206,9 @@ def _recorded(path: Path, result: DiagnosisResult, say: Callable[[str], None]) -
     record_diagnosis(path, result, say)
 
 
-def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, total_s: float) -> DiagnosisResult:
+def result_of(
+    measurement: Measurement, order: DiagnoseOrder, given: Given, found: Diagnosis, total_s: float
+) -> DiagnosisResult:
     """The content of ``diagnosis.json``."""
     verdict = found.verdict
     units = {s.name: s.unit for condition in found.conditions for s in summaries(condition)}
@@ -242,7 +257,9 @@ def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, 
             order.budget,
             order.seed,
             str(order.follow_up) if order.follow_up else None,
+            str(order.given) if order.given else None,
         ),
+        given={name: tuple(amplitude) for name, amplitude in given.items()},
         units=units,
         pours=PourCounts(found.pours, found.settings),
         timing=Duration(total_s),

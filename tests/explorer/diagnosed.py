@@ -310,7 +310,7 @@ def result_of_case(name):
     """What the report gets: the content of diagnosis.json, read back as a reader of the file would."""
     measurement, found = diagnosed(**CASES[name])
     order = DiagnoseOrder(measurement.folder, Path("results/made up"), budget=900)
-    result = result_of(measurement, order, found, 912.5)
+    result = result_of(measurement, order, {}, found, 912.5)
     return json.loads(json.dumps(result.to_dict(), allow_nan=False))
 
 

@@ -17,6 +17,7 @@ from explorer.report.diagnosis.wording import (
     feature_in,
     feature_label,
     feature_value,
+    given_text,
     literature_bound,
     members,
     model_words,
@@ -67,7 +68,8 @@ def _what_next(result: DiagnosisResult) -> str:
         case "effect" | "effects":
             return (
                 f"Pour the corrected material, and calibrate it with its study: `{CORRECTED}` and "
-                f"`{CORRECTED_STUDY}`, which `explorer diagnose … --apply` writes beside this report."
+                f"`{CORRECTED_STUDY}`, which `explorer diagnose … --apply` writes beside this report. What else is "
+                f"missing beside it, `explorer diagnose … --given {result.order.out}` asks."
             )
         case "ambiguous":
             return f"{_asked_for(result)} `explorer diagnose … --follow-up` takes them."
@@ -95,7 +97,14 @@ def in_short(result: DiagnosisResult) -> Section:
 
 
 def verdict_sentence(result: DiagnosisResult) -> str:
-    """The verdict for an engineer, with what held-out data say of it."""
+    """The verdict for an engineer, with what held-out data say of it, and what the model had before."""
+    if not result.given:
+        return _verdict(result)
+    known = enumeration([code(name) for name in result.given])
+    return f"With {known} in the declared model, as an earlier diagnosis found: {_verdict(result)}"
+
+
+def _verdict(result: DiagnosisResult) -> str:
     if result.taken_back and result.held_out is not None:
         return _taken_back(result, result.held_out)
     match result.kind:
@@ -296,6 +305,9 @@ def _facts(result: DiagnosisResult) -> list[tuple[str, str]]:
         for row in result.measured
     )
     facts = [("Verdict", code(result.verdict)), ("Measured", measured)]
+    if result.given:
+        sizes = ", ".join(given_text(name, amplitude) for name, amplitude in result.given.items())
+        facts.append(("In the model already", f"{sizes}; calibrated with the other parameters about that"))
     row = result.effect_row(result.final)
     if row is not None:
         bounds = "; ".join(

@@ -196,4 +196,6 @@ def command(result: DiagnosisResult) -> str:
         parts += ["--seed", str(order.seed)]
     if order.follow_up:
         parts += ["--follow-up", order.follow_up]
+    if order.given:
+        parts += ["--given", order.given]
     return shlex.join(parts)

@@ -98,6 +98,12 @@ def amplitudes_of(estimates: Sequence[Amplitude]) -> str:
     return "; ".join(f"{amplitude_label(one.effect, one.index)} {amplitude_text(one)}" for one in estimates)
 
 
+def given_text(effect: str, amplitude: Sequence[float]) -> str:
+    """The amplitudes of an effect that the declared model holds, e.g. "rolling friction 0.12"."""
+    named = [(index, amplitude_path(effect, index), one) for index, one in enumerate(amplitude)]
+    return "; ".join(f"{amplitude_label(effect, index)} {parameter_value(path, one)}" for index, path, one in named)
+
+
 def share_of_bound(effect: str, amplitudes: Sequence[float]) -> float:
     """Size of an effect's amplitudes over the strongest that the literature supports."""
     return math.hypot(*amplitudes) / EFFECTS[effect].strongest

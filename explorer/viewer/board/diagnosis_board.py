@@ -16,7 +16,9 @@ from explorer.viewer.board.board import Board, BoardAct, BoardTable, made_charts
 from explorer.viewer.board.study_board import stages_of, working
 
 SIDE_BY_SIDE, POUR_CORRECTED, CALIBRATE_CORRECTED = "show_piles", "pour_corrected", "calibrate_corrected"
+ASK_FURTHER = "ask_further"
 """Commands of a board's buttons."""
+FURTHER_ACT = BoardAct("What else is missing?", {"do": ASK_FURTHER})
 SIDE_BY_SIDE_ACT = BoardAct("Show side by side", {"do": SIDE_BY_SIDE})
 CORRECTED_ACTS = (
     BoardAct("Pour the corrected model", {"do": POUR_CORRECTED}),
@@ -43,7 +45,11 @@ def diagnosis_board(result: DiagnosisResult | None, status: CommandStatus | None
         title=result.data.title or result.data.folder,
         subtitle=subtitle,
         banner=banner(result),
-        acts=(SIDE_BY_SIDE_ACT, *(CORRECTED_ACTS if result.added else ())),
+        acts=(
+            SIDE_BY_SIDE_ACT,
+            *(CORRECTED_ACTS if result.added else ()),
+            *((FURTHER_ACT,) if result.handed_on() else ()),
+        ),
         stages=stages_of(status) if alive else (),
         charts=made_charts(first | maps | rest),
         tables=(_answers(result), _errors(result)),

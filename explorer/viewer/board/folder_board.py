@@ -38,9 +38,10 @@ class FolderBoard:
         self.follow()
 
     def follow(self) -> None:
-        """Publish the board anew where a result, or its report, has changed."""
+        """Publish the board anew where a result, its report, or what is left out of it has changed."""
         study, diagnosis = self._study.read(self._folder), self._diagnosis.read(self._folder)
-        shown = (self._study.version, self._diagnosis.version, (self._folder / REPORT).is_file())
+        excluded = load_excluded(self._folder)
+        shown = (self._study.version, self._diagnosis.version, (self._folder / REPORT).is_file(), excluded)
         if shown == self._shown:
             return
         self._shown = shown
@@ -54,7 +55,7 @@ class FolderBoard:
                     None,
                     report,
                     photographed_of(self._folder),
-                    load_excluded(self._folder),
+                    excluded,
                 )
         except RecordError as error:
             raise CommandError(f"{self._folder}: {error}") from None

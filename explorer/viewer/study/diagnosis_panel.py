@@ -22,7 +22,9 @@ from explorer.units import checked
 from explorer.viewer.actions import button_group
 from explorer.viewer.board.board_view import BoardView
 from explorer.viewer.board.diagnosis_board import (
+    ASK_FURTHER,
     CALIBRATE_CORRECTED,
+    FURTHER_ACT,
     POUR_CORRECTED,
     SIDE_BY_SIDE,
     SIDE_BY_SIDE_ACT,
@@ -104,15 +106,21 @@ class DiagnosisPanel(Panel):
         self._corrected = button_group(
             gui,
             "Corrected model",
-            {"Pour it": self._pour_corrected, "Calibrate it": self._calibrate_corrected},
+            {
+                "Pour it": self._pour_corrected,
+                "Calibrate it": self._calibrate_corrected,
+                FURTHER_ACT.label: self._ask_further,
+            },
             post,
             hint="The corrected model alone, as the pour that the controls act on; or a study of it in the background "
-            "(*Calibrate*), with its quick profile.",
+            "(*Calibrate*), with its quick profile; or another diagnosis of the same data, with the effect in the "
+            "model: it takes about as long as the first.",
         )
         for name, act in {
             SIDE_BY_SIDE: self._show_piles,
             POUR_CORRECTED: self._pour_corrected,
             CALIBRATE_CORRECTED: self._calibrate_corrected,
+            ASK_FURTHER: self._ask_further,
         }.items():
             page.channel.offer(name, lambda _, act=act: post(act))  # type: ignore[misc]
         self._recording = PileRecording(page, self._record_order)
@@ -222,6 +230,14 @@ class DiagnosisPanel(Panel):
             )
             raise CommandError(f"there is no corrected model to calibrate: {why}")
         self._page.study.start(SHORT_PROFILE, file=file)
+
+    def _ask_further(self) -> None:
+        """Another diagnosis of the same data, with the effect that this one found in the model."""
+        result, folder = self._found(), self._chooser.folder or self._present()
+        if not result.handed_on():
+            raise CommandError("no effect is as probable here as a name has to be: there is none to go on from")
+        budget = self._candidates.budget
+        self._diagnosis.start(Question(result.data.folder, self._candidates.effects, budget, str(folder)))
 
     def _record_order(self) -> tuple[Path, list[str]]:
         """Folder of the shown diagnosis, and its command line."""

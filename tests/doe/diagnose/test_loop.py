@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from doe.declared.given import with_given
 from doe.declared.model import declare
 from doe.declared.points import AS_IT_IS
 from doe.declared.pours import PointPour
@@ -187,6 +188,44 @@ def test_two_effects_at_once_are_named_together(measurement, monkeypatch):
     found, said = run(measurement, monkeypatch, planted)
     assert found.verdict.kind == "effects:rolling_resistance+density_error", said
     assert {name for name, _ in found.after.model.effects} == {"rolling_resistance", "density_error"}
+
+
+def not_adding(theta, effects, condition, width):
+    """As :func:`expected`, but a wrong density does something else beside rolling resistance.
+
+    A parameter more than the three that are declared is the amplitude of a rolling resistance that is given.
+    """
+    effects, given = dict(effects), FormulaPours.declared.parameters[3:]
+    if given and len(theta) > 3:
+        effects["rolling_resistance"] = (given[0].natural(theta[3]),)
+    mean = expected(theta[:3], effects.items(), condition, width)
+    if "rolling_resistance" in effects and "density_error" in effects:
+        size = 9.0 * effects["density_error"][0] / EFFECTS["density_error"].strongest
+        mean += size * (direction(f"{condition} beside", width) - direction(f"{condition} density_error 0", width))
+    return mean
+
+
+def test_what_is_missing_beside_a_given_effect_is_named_where_the_two_do_not_add(measurement, monkeypatch):
+    rolling = 0.6 * EFFECTS["rolling_resistance"].strongest
+    planted = (("rolling_resistance", (rolling,)), ("density_error", (0.25,)))
+    found, said = run(measurement, monkeypatch, planted, formula=not_adding)
+    assert found.verdict.kind != "effects:rolling_resistance+density_error", said
+    given = with_given(measurement, {"rolling_resistance": (0.9 * rolling,)})
+    monkeypatch.setattr(FormulaPours, "declared", declare(given, NAMES))
+    found, said = run(given, monkeypatch, planted, formula=not_adding)
+    assert found.verdict.kind == "effect:density_error", said
+    known = found.verdict.parameters[3]
+    assert known.name == "effect.rolling_resistance.rolling_friction"
+    assert known.after == pytest.approx(rolling, abs=3.0 * known.after_sd)
+    assert known.after_sd < 0.2 * rolling
+
+
+def test_beside_all_that_is_missing_nothing_else_is(measurement, monkeypatch):
+    rolling = 0.6 * EFFECTS["rolling_resistance"].strongest
+    given = with_given(measurement, {"rolling_resistance": (1.1 * rolling,)})
+    monkeypatch.setattr(FormulaPours, "declared", declare(given, NAMES))
+    found, said = run(given, monkeypatch, (("rolling_resistance", (rolling,)),), formula=not_adding)
+    assert found.verdict.kind == "no_missing_effect", said
 
 
 FITTED = {condition.name for condition in load_measurement(measurement_folder("trefoil_1")).fit}

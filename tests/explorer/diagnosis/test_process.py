@@ -353,7 +353,10 @@ def test_the_answer_s_buttons_pour_and_calibrate_the_corrected_model(server, tmp
     (tmp_path / "diagnosis.json").write_text(json.dumps(result_of_case("effect")))
     panel.show(Now(None))
     acts = {one["label"]: one["command"] for one in board(panel)["acts"]}
-    assert tuple(acts) == ("Show side by side", "Pour the corrected model", "Calibrate the corrected model")
+    assert tuple(acts) == (
+        *("Show side by side", "Pour the corrected model", "Calibrate the corrected model"),
+        "What else is missing?",
+    )
 
     def press_on_the_board(label):
         page.channel.take(json.dumps(acts[label]))
@@ -364,12 +367,27 @@ def test_the_answer_s_buttons_pour_and_calibrate_the_corrected_model(server, tmp
     (tmp_path / "corrected_study.toml").touch()
     assert press_on_the_board("Calibrate the corrected model") == ""
     assert started == [("quick", tmp_path / "corrected_study.toml")]
+    assert press_on_the_board("What else is missing?") == ""
+    assert process.asked == [("start", Question("data/made up", given=str(tmp_path)))]
     for label in ("Show side by side", "Pour the corrected model"):
         page.channel.take(json.dumps(acts[label]))
         assert "not there any more" in finished(actions, page.background)  # the data of this made-up result
     (tmp_path / "diagnosis.json").write_text(json.dumps(result_of_case("nothing")))
     panel.show(Now(None))
     assert [one["label"] for one in board(panel)["acts"]] == ["Show side by side"]
+
+
+def test_a_diagnosis_that_goes_on_from_another_names_it_and_is_none_to_resume(tmp_path):
+    process = diagnosis(tmp_path, "time.sleep(60)")
+    process.start(Question("trefoil_1", given="results/first"))
+    wait_for(lambda: process.status().done == 3)
+    process.cancel()
+    wait_for(lambda: not process.status().alive)
+    folder = only_folder(tmp_path)
+    arguments = json.loads((folder / "arguments.json").read_text())
+    assert arguments[arguments.index("--given") + 1] == "results/first"
+    # Resumed by its data's name it would be another question.
+    assert not process.resumable(Question("trefoil_1"))
 
 
 @pytest.mark.parametrize(("width", "folded"), [(390, True), (1200, False)])

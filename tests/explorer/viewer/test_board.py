@@ -4,11 +4,13 @@ import json
 
 import pytest
 
+from doe.studies.exclusion import ExcludedRun
 from doe.studies.study_result import study_from
 from explorer.background.command_process import CommandStatus
 from explorer.background.progress import StageProgress
 from explorer.errors import CommandError
 from explorer.report.content import Word
+from explorer.study.excluded_runs import keep_excluded
 from explorer.viewer.board.board import Board, board_json
 from explorer.viewer.board.diagnosis_board import diagnosis_board
 from explorer.viewer.board.folder_board import FolderBoard
@@ -94,6 +96,12 @@ def test_a_folder_is_a_board_that_follows_its_files(tmp_path):
     (tmp_path / "report.html").write_text("written last", encoding="utf-8")
     folder.follow()
     assert pages.page(json.loads(pages.page(folder.address).body)["report"]).body == b"written last"
+    left_out = study_from(result).surface.runs[0][0]
+    keep_excluded(
+        tmp_path, study_from(result), [ExcludedRun(left_out.label, left_out.experiment, left_out.seed, "spilled")]
+    )
+    folder.follow()
+    assert "spilled" in pages.page(folder.address).body.decode()
     (tmp_path / "result.json").write_text('{"runs": 1}', encoding="utf-8")
     with pytest.raises(CommandError, match=str(tmp_path)):
         folder.follow()
