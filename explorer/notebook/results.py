@@ -103,6 +103,7 @@ def diagnose(
     workers: int | None = None,
     seed: int = 0,
     follow_up: str | Path | None = None,
+    given: str | Path | None = None,
     apply: bool = False,
     say: Say = print,
 ) -> DiagnosisResult:
@@ -124,6 +125,8 @@ def diagnose(
         Of the pours.
     follow_up
         The folder ``next`` that an ambiguous answer left in its ``out``, filled in.
+    given
+        The ``out`` of a finished diagnosis: with its effect in the model, what else is missing?
     apply
         Also write the corrected material, ``corrected.toml``.
 
@@ -148,6 +151,7 @@ def diagnose(
         apply=apply,
         seed=seed,
         follow_up=None if follow_up is None else Path(follow_up),
+        given=None if given is None else Path(given),
     )
     with Reporter("diagnose", say) as reporter:
         return diagnosis_run.run_diagnose(order, reporter)

@@ -101,7 +101,7 @@ def verdict_sentence(result: DiagnosisResult) -> str:
     if not result.given:
         return _verdict(result)
     known = enumeration([code(name) for name in result.given])
-    return f"With {known} in the declared model, as an earlier diagnosis found: {_verdict(result)}"
+    return f"The declared model holds {known} here, as an earlier diagnosis found. {_verdict(result)}"
 
 
 def _verdict(result: DiagnosisResult) -> str:
@@ -306,7 +306,7 @@ def _facts(result: DiagnosisResult) -> list[tuple[str, str]]:
     )
     facts = [("Verdict", code(result.verdict)), ("Measured", measured)]
     if result.given:
-        sizes = ", ".join(given_text(name, amplitude) for name, amplitude in result.given.items())
+        sizes = "; ".join(given_text(name, amplitude) for name, amplitude in result.given.items())
         facts.append(("In the model already", f"{sizes}; calibrated with the other parameters about that"))
     row = result.effect_row(result.final)
     if row is not None:

@@ -99,9 +99,10 @@ def amplitudes_of(estimates: Sequence[Amplitude]) -> str:
 
 
 def given_text(effect: str, amplitude: Sequence[float]) -> str:
-    """The amplitudes of an effect that the declared model holds, e.g. "rolling friction 0.12"."""
+    """An effect that the declared model holds, e.g. "`rolling_resistance`, rolling friction 0.12"."""
     named = [(index, amplitude_path(effect, index), one) for index, one in enumerate(amplitude)]
-    return "; ".join(f"{amplitude_label(effect, index)} {parameter_value(path, one)}" for index, path, one in named)
+    sizes = (f"{amplitude_label(effect, index)} {parameter_value(path, one)}" for index, path, one in named)
+    return ", ".join((code(effect), *sizes))
 
 
 def share_of_bound(effect: str, amplitudes: Sequence[float]) -> float:

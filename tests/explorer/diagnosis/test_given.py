@@ -78,12 +78,12 @@ def test_what_was_measured_for_the_answer_before_is_joined(tmp_path):
 def test_the_report_says_what_was_in_the_model_and_how_it_is_asked():
     first = typed(result_of_case("effect"))
     assert f"--given {first.order.out}" in document(diagnosis_report(first))
-    assert not verdict_sentence(first).startswith("With ")
+    assert not verdict_sentence(first).startswith("The declared model holds")
     second = replace(first, given={"density_error": (0.2,)}, order=replace(first.order, given="results/first"))
     assert verdict_sentence(second).startswith(
-        "With `density_error` in the declared model, as an earlier diagnosis found: The declared model lacks "
+        "The declared model holds `density_error` here, as an earlier diagnosis found. The declared model lacks "
     )
     assert command(second).endswith("--given results/first")
     said = document(diagnosis_report(second))
     assert "In the model already" in said
-    assert "excess 0.2; calibrated with the other parameters about that" in said
+    assert "`density_error`, excess 0.2; calibrated with the other parameters about that" in said
