@@ -12,7 +12,6 @@ from explorer.background.command_process import BackgroundError, CommandStatus
 from explorer.background.progress import StageProgress
 from explorer.diagnosis.process import DiagnoseProcess, Question
 from explorer.diagnosis.result import DiagnosisResult
-from explorer.errors import CommandError
 from explorer.priority import BACKGROUND
 from explorer.report.content import Word
 from explorer.scene.file import material_scene
@@ -20,7 +19,9 @@ from explorer.scene.source import material_source
 from explorer.viewer.actions import Actions
 from explorer.viewer.board.board import board_json
 from explorer.viewer.board.diagnosis_board import diagnosis_board
+from explorer.viewer.output import pile_recording
 from explorer.viewer.panel import Now
+from explorer.viewer.study import diagnosis_panel
 from explorer.viewer.study.diagnosis_panel import OWN, DiagnosisPanel, fold_beside_narrow
 from explorer.viewer.study.process_view import CANCEL, CLEAR, CONTINUE, PAUSE, QUEUE, RESUME, START
 from solver import EFFECTS, AssetNotFoundError, with_values
@@ -28,6 +29,7 @@ from solver.assets import measurement_folder
 from tests.explorer.background.waiting import only_folder, wait_for
 from tests.explorer.diagnosed import result_of_case, typed
 from tests.explorer.viewer.page_session import PageSession, finished, page_context
+from tests.explorer.viewer.person import Person
 from tests.explorer.viewer.study_panel_at_hand import board_at
 
 PROGRAM = """
@@ -200,10 +202,29 @@ class FakeDiagnosis:
         return ()
 
 
-def press(panel, button):
-    click = type("Event", (), {"client_id": 0, "target": type("Group", (), {"value": button})})
-    for callback in panel._view._buttons._impl.update_cb:
-        callback(click)
+class Room:
+    """The panel with a diagnosis that only remembers, and a person at its controls."""
+
+    def __init__(self, server, data, session=None, study=None):
+        self.process, self.actions = FakeDiagnosis(), Actions()
+        self.page = page_context(server, session, self.actions.post, data, study, self.process)
+        with server.gui.add_folder("diagnosis") as place:
+            self.panel = DiagnosisPanel(self.page)
+        self.person = Person(place, lambda: finished(self.actions, self.page.background))
+
+    def show(self, notice=""):
+        self.panel.show(Now(None, notice=notice))
+
+    def found(self, content):
+        """A finished diagnosis: what its file holds."""
+        (self.page.data / "diagnosis.json").write_text(content if isinstance(content, str) else json.dumps(content))
+        self.process.out = self.page.data
+        self.show()
+
+
+@pytest.fixture
+def room(server, tmp_path):
+    return Room(server, tmp_path)
 
 
 def board(panel):
@@ -211,103 +232,92 @@ def board(panel):
     return board_at(panel, "/diagnosis/page.json")
 
 
-def test_the_panel_asks_and_shows(server, tmp_path):
-    process, actions = FakeDiagnosis(), Actions()
-    panel = DiagnosisPanel(page_context(server, post=actions.post, data=tmp_path, diagnosis=process))
-    panel._data.value = "trefoil_2"
+def test_the_piles_of_an_answer_are_recorded_by_its_command(room, tmp_path, monkeypatch):
+    ordered = []
+    monkeypatch.setattr(pile_recording, "command_output", lambda command, *_: ordered.append(command))
+    room.found(result_of_case("effect"))
+    room.person.press(pile_recording.RECORD)
+    wait_for(lambda: ordered)
+    assert ordered[0][:5] == ["diagnose", "data/made up", "--out", str(tmp_path), "--record"]
+
+
+def test_the_panel_asks_and_shows(room, tmp_path):
+    person, process = room.person, room.process
+    assert person.value("Measured data") == "trefoil_2"
     for button in (START, PAUSE, CANCEL, "Delete everything"):
-        press(panel, button)
-    actions.carry_out()
-    panel._data.value = OWN
-    panel._folder.value = "/home/me/my data"
+        person.send("Diagnosis", button)
+    person.enter("Measured data", OWN)
+    person.enter("Folder", "/home/me/my data")
     process.now = CommandStatus("paused")
-    press(panel, RESUME)
-    press(panel, CONTINUE)
-    actions.carry_out()
+    for button in (RESUME, CONTINUE):
+        person.send("Diagnosis", button)
     mine = Question("/home/me/my data")
     assert process.asked == [("start", Question("trefoil_2")), "pause", "cancel", ("resume", mine), "go on"]
     stages = (StageProgress("base model", 30, 30, "*64* settings"), StageProgress("screening", 5, 20))
     process.now = CommandStatus("running", "screening", 5, 20, 125.0, stages=stages)
-    panel.show(Now(None, notice="no such folder"))
-    assert panel._view._bar.value == 25.0
-    text = panel._view._text.content
-    assert "Known of this stage: 5 of 20 pours, time left 2 min 05 s" in text
-    assert "no such folder" in text
-    assert [(one["name"], one["count"], one["mark"], one["found"]) for one in board(panel)["stages"]] == [
+    room.show("no such folder")
+    assert person.progress == [25.0]
+    assert "Known of this stage: 5 of 20 pours, time left 2 min 05 s" in person.text
+    assert "no such folder" in person.text
+    assert [(one["name"], one["count"], one["mark"], one["found"]) for one in board(room.panel)["stages"]] == [
         ("base model", "30 of 30", "done", "*64* settings"),
         ("screening", "5 of 20", "▶", ""),
     ]
-    for act in (panel._show_piles, panel._pour_corrected, panel._calibrate_corrected, panel._record_order):
-        with pytest.raises(CommandError, match="no finished diagnosis yet"):
-            act()
-    process.now = CommandStatus("finished", message="report: /home/me/out/report.html")
-    process.out = tmp_path
-    (tmp_path / "diagnosis.json").write_text(json.dumps(result_of_case("effect")))
-    panel.show(Now(None))
-    assert "/home/me/out/report.html" in panel._view._text.content
-    assert panel._record_order() == (tmp_path, ["diagnose", "data/made up"])
-    shown = board(panel)
+    # Nothing is offered before there is an answer, and what a browser sends all the same is refused.
+    assert not person.sees("Piles")
+    for command in ("show_piles", "pour_corrected", "calibrate_corrected", "ask_further"):
+        room.page.channel.take(json.dumps({"do": command}))
+        assert "no finished diagnosis yet" in finished(room.actions, room.page.background)
+    process.now = CommandStatus("finished", message="report: /home/me/out/report.html", stages=stages)
+    room.found(result_of_case("effect"))
+    assert "/home/me/out/report.html" in person.text
+    shown = board(room.panel)
     assert shown["banner"]["headline"].startswith(Word.EFFECT_FOUND)
     assert "Residuals before and after" in [chart["title"] for chart in shown["charts"]]
 
 
-def test_an_uploaded_data_set_can_be_diagnosed(server, tmp_path):
-    process, actions = FakeDiagnosis(), Actions()
-    panel = DiagnosisPanel(page_context(server, post=actions.post, data=tmp_path, diagnosis=process))
+def test_an_uploaded_data_set_can_be_diagnosed(room, tmp_path):
     kept = tmp_path / "uploads" / "mine-0123456789ab"
     shutil.copytree(measurement_folder("trefoil_1"), kept)
-    panel.show(Now(None))
-    assert "mine-0123456789ab" in panel._data.options
-    panel._data.value = "mine-0123456789ab"
-    press(panel, START)
-    actions.carry_out()
-    assert process.asked == [("start", Question(str(kept)))]
+    room.show()
+    room.person.enter("Measured data", "mine-0123456789ab")
+    room.person.press(START)
+    assert room.process.asked == [("start", Question(str(kept)))]
 
 
-def test_effects_budget_and_queue_are_asked_for_on_the_page(server, tmp_path):
-    process, actions = FakeDiagnosis(), Actions()
-    panel = DiagnosisPanel(page_context(server, post=actions.post, data=tmp_path, diagnosis=process))
-    boxes = panel._candidates._boxes
-    assert tuple(boxes) == tuple(EFFECTS)
-    for name in EFFECTS:
-        boxes[name].value = name in ("air_drag", "twisting")
-    panel._candidates._pours.value = 300
-    press(panel, QUEUE)
-    press(panel, CLEAR)
-    actions.carry_out()
-    assert process.asked == [("queue", Question("trefoil_2", ("air_drag", "twisting"), 300)), "clear queue"]
-    panel.show(Now(None))
-    assert "Waiting: trefoil" in panel._view._text.content
-    for box in boxes.values():
-        box.value = False
-    with pytest.raises(ValueError, match="none is chosen"):
-        panel._question()
+def test_effects_budget_and_queue_are_asked_for_on_the_page(room):
+    person = room.person.within("Effects in question, and how much is poured")
+    boxes = [name.replace("_", " ") for name in EFFECTS]
+    assert person.labels[: len(boxes)] == boxes
+    for label in boxes:
+        person.enter(label, label in ("air drag", "twisting"))
+    person.enter("Pours (0: by itself)", 300)
+    room.process.now = CommandStatus("running")
+    room.show()
+    room.person.press(QUEUE)
+    room.person.press(CLEAR)
+    assert room.process.asked == [("queue", Question("trefoil_2", ("air_drag", "twisting"), 300)), "clear queue"]
+    assert "Waiting: trefoil" in room.person.text
+    for label in ("air drag", "twisting"):
+        person.enter(label, False)
+    assert "none is chosen" in room.person.press(QUEUE)
 
 
-def test_a_file_that_is_no_diagnosis_is_one_line(server, tmp_path):
-    process, actions = FakeDiagnosis(), Actions()
-    panel = DiagnosisPanel(page_context(server, post=actions.post, data=tmp_path, diagnosis=process))
-    (tmp_path / "diagnosis.json").write_text(json.dumps({"schema": DiagnosisResult.SCHEMA, "verdict": "<script>"}))
-    process.out = tmp_path
-    panel.show(Now(None))
-    assert panel._trouble.content.endswith("diagnosis.json: statement: is missing")
+def test_a_file_that_is_no_diagnosis_is_one_line(room):
+    room.found({"schema": DiagnosisResult.SCHEMA, "verdict": "<script>"})
+    assert "diagnosis.json: statement: is missing" in room.person.text.replace("\\", "")
     content = result_of_case("effect")
     content["names"] = []
-    (tmp_path / "diagnosis.json").write_text(json.dumps(content))
-    panel.show(Now(None))
-    shown = board(panel)
+    room.found(content)
+    shown = board(room.panel)
     assert shown["title"] == "This result cannot be shown"
     assert shown["charts"] == []
 
 
-def test_a_diagnosis_of_an_older_version_is_one_line(server, tmp_path):
-    process, actions = FakeDiagnosis(), Actions()
-    panel = DiagnosisPanel(page_context(server, post=actions.post, data=tmp_path, diagnosis=process))
-    (tmp_path / "diagnosis.json").write_text('{"schema": 1, "verdict": "no_missing_effect", "gates": []}')
-    process.out = tmp_path
-    panel.show(Now(None))
-    assert "made by an older version of the program" in panel._trouble.content
-    assert "\n" not in panel._trouble.content
+def test_a_diagnosis_of_an_older_version_is_one_line(room):
+    room.found('{"schema": 1, "verdict": "no_missing_effect", "gates": []}')
+    (line,) = [one for one in room.person.html.split("\n") if "made by an older version of the program" in one]
+    assert "allowed: " in line
 
 
 def test_the_answer_holds_probabilities_and_errors_before_after_and_by_noise_alone():
@@ -323,35 +333,37 @@ def test_the_answer_holds_probabilities_and_errors_before_after_and_by_noise_alo
         assert len(errors["rows"]) == len(content["error"][role])
 
 
-def test_a_pour_of_an_answer_leaves_a_way_back_to_one_s_own(server):
+def test_a_pour_of_an_answer_leaves_a_way_back_to_one_s_own(server, tmp_path, monkeypatch):
     session = PageSession(material_source("sunflower_extract"))
     own, other = session.now.scene, material_scene("nine_sphere_seed")
-    panel = DiagnosisPanel(page_context(server, session, diagnosis=FakeDiagnosis()))
-    with pytest.raises(CommandError, match="your own pour is on the screen"):
-        panel._back()
+    room = Room(server, tmp_path, session)
+    models = iter((other, with_values(other, {"rig.mass": "10g"})))
+    monkeypatch.setattr(diagnosis_panel, "answer_piles", lambda result: SimpleNamespace(after=next(models)))
+    assert not room.person.sees("Piles")
     session.restart(with_values(own, {"rig.mass": "20g"}), 7)
     mine = session.now.scene
+    room.found(result_of_case("effect"))
+    assert "your own pour is on the screen" in room.person.press("Back to my pour")
     # One model, then the other in its place: what comes back is the person's own, with its seed and its source.
-    panel._pour(other)
-    panel._pour(with_values(other, {"rig.mass": "10g"}))
+    for _ in range(2):
+        assert room.person.press("Pour it") == ""
     assert session.now.scene != mine
     # The answer may be gone, as when another diagnosis starts; the way back is not.
-    panel._offer_piles()
-    assert panel._piles.visible
-    panel._back()
+    (tmp_path / "diagnosis.json").unlink()
+    room.show()
+    assert not room.person.sees("Corrected model")
+    assert room.person.press("Back to my pour") == ""
     assert (session.now.scene, session.now.seed, session.source) == (mine, 7, material_source("sunflower_extract"))
-    panel._offer_piles()
-    assert not panel._piles.visible
+    room.show()
+    assert not room.person.sees("Piles")
 
 
 def test_the_answer_s_buttons_pour_and_calibrate_the_corrected_model(server, tmp_path):
-    process, actions, started = FakeDiagnosis(), Actions(), []
+    started = []
     study = SimpleNamespace(start=lambda profile, file: started.append((profile, file)))
-    page = page_context(server, post=actions.post, data=tmp_path, study=study, diagnosis=process)
-    panel = DiagnosisPanel(page)
-    process.out = tmp_path
-    (tmp_path / "diagnosis.json").write_text(json.dumps(result_of_case("effect")))
-    panel.show(Now(None))
+    room = Room(server, tmp_path, study=study)
+    panel, page, actions, process = room.panel, room.page, room.actions, room.process
+    room.found(result_of_case("effect"))
     acts = {one["label"]: one["command"] for one in board(panel)["acts"]}
     assert tuple(acts) == (
         *("Show side by side", "Pour the corrected model", "Calibrate the corrected model"),
@@ -372,9 +384,9 @@ def test_the_answer_s_buttons_pour_and_calibrate_the_corrected_model(server, tmp
     for label in ("Show side by side", "Pour the corrected model"):
         page.channel.take(json.dumps(acts[label]))
         assert "not there any more" in finished(actions, page.background)  # the data of this made-up result
-    (tmp_path / "diagnosis.json").write_text(json.dumps(result_of_case("nothing")))
-    panel.show(Now(None))
+    room.found(result_of_case("nothing"))
     assert [one["label"] for one in board(panel)["acts"]] == ["Show side by side"]
+    assert not room.person.sees("Corrected model")
 
 
 def test_a_diagnosis_that_goes_on_from_another_names_it_and_is_none_to_resume(tmp_path):

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import viser
-from viser._gui_handles import _GuiInputHandle
+from viser._gui_handles import GuiProgressBarHandle, _GuiInputHandle
 
 from explorer.viewer.incoming import valid_value
 
@@ -81,12 +81,41 @@ class Person:
     def send(self, label, value):
         """Send ``value`` to a control whatever it is, as nobody at the page could. The line of a refusal."""
         handle = self.control(label)
-        if not isinstance(handle, viser.GuiButtonHandle | viser.GuiUploadButtonHandle):
+        if not isinstance(handle, viser.GuiButtonHandle | viser.GuiUploadButtonHandle) and _fits(handle, value):
             handle.value = value
         told = SimpleNamespace(value=value)
         for callback in tuple(handle._impl.update_cb):
             callback(SimpleNamespace(client_id=0, client=self.browser, target=told))
         return self._carry_out() or ""
+
+    def hit(self, label):
+        """Press the key of the page's command with these words. The line of a refusal."""
+        for callback in tuple(self._command(label)._impl.trigger_cb):
+            callback(SimpleNamespace(client_id=0, client=self.browser))
+        return self._carry_out() or ""
+
+    def arrive(self):
+        """Open the page, as a browser does that was not there yet. The line of a refusal."""
+        for callback in tuple(self._place._client_connect_cb):
+            callback(self.browser)
+        return self._carry_out() or ""
+
+    def uuid(self, label):
+        """What a browser calls the control with these words where it talks over its socket."""
+        return self.control(label)._impl.uuid
+
+    def key_uuid(self, label):
+        """The same of the page's command with these words."""
+        return self._command(label)._impl.uuid
+
+    @property
+    def tabs(self):
+        """Titles of the tabs that are seen here, a list for each row of them."""
+        rows = {}
+        for one in self._walk(self._place):
+            if isinstance(one, viser.GuiTabHandle):
+                rows.setdefault(id(one._parent), []).append(one._label)
+        return list(rows.values())
 
     @property
     def html(self):
@@ -96,7 +125,7 @@ class Person:
     @property
     def text(self):
         """All that is written here, as it is read: without marks, one blank between words."""
-        return " ".join(unescape(re.sub(r"<[^>]*>", " ", self.html)).split())
+        return " ".join(unescape(re.sub(r"<style>[^<]*</style>|<[^>]*>", " ", self.html)).split())
 
     @property
     def charts(self):
@@ -105,9 +134,24 @@ class Person:
         return [json.loads(one._plotly_json_str) for one in charts]
 
     @property
+    def progress(self):
+        """How far the bars that are seen here are [%]."""
+        return [one.value for one in self._walk(self._place) if isinstance(one, GuiProgressBarHandle)]
+
+    @property
+    def curves(self):
+        """viser's handles of the curves over time that are drawn here: their ``data``, their ``series``."""
+        return [one for one in self._walk(self._place) if isinstance(one, viser.GuiUplotHandle)]
+
+    @property
     def pictures(self):
         """viser's handles of the pictures that are shown here."""
         return [one for one in self._walk(self._place) if isinstance(one, viser.GuiImageHandle)]
+
+    def _command(self, label):
+        commands = [one for one in self._place.gui._command_handle_from_uuid.values() if one.label == label]
+        assert len(commands) == 1, f"{len(commands)} commands are called {label!r}"
+        return commands[0]
 
     def _controls(self):
         return [one for one in self._walk(self._place) if isinstance(one, _GuiInputHandle) and hasattr(one, "label")]
@@ -124,7 +168,7 @@ class Browser:
     """What is asked of a person's browser: its size, its picture (``error``: why it gives none), files for it."""
 
     def __init__(self, error=None):
-        self.sent, self.error, self.client_id = {}, error, 0
+        self.sent, self.error, self.client_id, self.atomic = {}, error, 0, nullcontext
         nothing = SimpleNamespace(buffer_lock=nullcontext(), message_from_id={})
         self._websock_connection = SimpleNamespace(get_message_buffer=lambda: nothing)
         self.camera = SimpleNamespace(
@@ -150,6 +194,15 @@ def _inside(place):
     if isinstance(place, viser.GuiTabGroupHandle):
         return tuple(place._tab_handles)
     return tuple(getattr(place, "_children", {}).values())
+
+
+def _fits(handle, value):
+    """Whether viser would keep it: no text in the place of a number."""
+    try:
+        type(handle.value)(value)
+    except (TypeError, ValueError):
+        return False
+    return True
 
 
 def _title(one):
