@@ -63,7 +63,7 @@ class Asked:
         declared, budget = declare(measurement, tuple(EFFECTS)), self._answers.budget
         training = TrainingPours(declared, measurement.fit, pours_in(measurement.fit), budget, lambda line: None)
         compared = pursued(training, measurement.fit, budget, lambda line: None)
-        verdict = verdict_of(compared, declared, training.levels, training.pours, is_last)
+        verdict = verdict_of(compared, declared, training.levels, training.pours, is_last and self._answers.follow_up)
         found = compared.posterior
         if is_last:
             return verdict, found, None
@@ -75,7 +75,7 @@ class Asked:
 
     def after_follow_up(self, measurement, given):
         """The first answer, the last one with its posterior, and the data that it was given by."""
-        verdict, found, next_one = self.judged(measurement, given)
+        verdict, found, next_one = self.judged(measurement, given, is_last=not self._answers.follow_up)
         first = verdict.kind
         if next_one is not None:
             more = self._answers.followed_up(self.truth, next_one, self._scanner, "then" if given else "next")
@@ -104,6 +104,7 @@ def second_round(answers, case, offer, say):
     _, last, found, measurement = asked.after_follow_up(measurement, {})
     best, p = found.best
     row = {"root": case.root, "number": case.number, "kind": case.kind, "label": label_of(truth), "offer": offer}
+    row |= {"follow_up": answers.follow_up}
     row |= {"strength": case.strength if case.strength == case.strength else None, "physics": PHYSICS}
     row |= {"first": last, "best": best, "best_p": round(p, 4), "given": {}, "second": "", "last": ""}
     if p >= THRESHOLD:
@@ -126,6 +127,7 @@ def main():
     parser.add_argument("--offer", choices=OFFERS, action="append")
     parser.add_argument("--store", type=Path, required=True)
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--no-follow-up", action="store_true", help="ask nothing of an ambiguous answer")
     asked = parser.parse_args()
     path = asked.out / NAME
     lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
@@ -137,7 +139,8 @@ def main():
         store = Store(asked.store)
         stack.callback(store.close)
         place = stack.enter_context(WorkPlace(store, asked.threads, float("inf")))
-        answers = Answers(laboratory, measured_strengths(order, laboratory, place, print), place, order.budget)
+        strengths = measured_strengths(order, laboratory, place, print)
+        answers = Answers(laboratory, strengths, place, order.budget, not asked.no_follow_up)
         for number in asked.numbers:
             for offer in asked.offer or OFFERS:
                 if (asked.root, number, offer) in there:

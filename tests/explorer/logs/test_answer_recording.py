@@ -28,7 +28,7 @@ from tests.explorer.command_line import explorer, refused
 from tests.explorer.logs.test_pour_log import rows
 from tests.explorer.study.test_run import Formula
 from tests.explorer.viewer.page_session import event, finished, page_context
-from tests.explorer.viewer.test_output import Browser
+from tests.explorer.viewer.person import Browser
 
 pytestmark = pytest.mark.usefixtures("unprinted")
 

@@ -169,8 +169,9 @@ class Browser:
 
     def __init__(self, error=None):
         self.sent, self.error, self.client_id, self.atomic = {}, error, 0, nullcontext
-        nothing = SimpleNamespace(buffer_lock=nullcontext(), message_from_id={})
-        self._websock_connection = SimpleNamespace(get_message_buffer=lambda: nothing)
+        self.waiting = {}  # messages that are on their way to it, by number
+        buffer = SimpleNamespace(buffer_lock=nullcontext(), message_from_id=self.waiting)
+        self._websock_connection = SimpleNamespace(get_message_buffer=lambda: buffer)
         self.camera = SimpleNamespace(
             image_height=90, image_width=5120, position=np.array([0.0, -0.5, 0.0]), look_at=np.zeros(3), fov=0.6
         )
@@ -184,6 +185,11 @@ class Browser:
             raise self.error
         assert transport_format == "png"
         return np.zeros((height, width, 4), dtype=np.uint8)  # nothing but what is transparent
+
+
+def drawn(server, below="/"):
+    """viser's handles of what is drawn in the scene below a node, by name: nobody can find a mesh by its words."""
+    return {name: node for name, node in server.scene._handle_from_node_name.items() if name.startswith(below)}
 
 
 def _inside(place):

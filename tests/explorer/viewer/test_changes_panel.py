@@ -10,18 +10,21 @@ from explorer.viewer.actions import Actions
 from explorer.viewer.panel import Now
 from explorer.viewer.pour.changes_panel import BACK, DEFAULT, MOST_SHOWN, REDO, UNDO, ChangesPanel, changes_html
 from solver.scenes.scene import value, with_values
-from tests.explorer.viewer.page_session import PageSession, event, page_context
+from tests.explorer.viewer.page_session import PageSession, page_context
+from tests.explorer.viewer.person import Person
 
 SOURCE = material_source("sunflower_extract")
 FRICTION, MASS = "pair.seed.seed.static_friction", "rig.mass"
 
 
 class Bench:
-    """A panel, its session, and the page's loop by hand."""
+    """A panel with a person at it, its session, and the page's loop by hand."""
 
     def __init__(self, server, folder):
         self.session, self.actions = PageSession(SOURCE), Actions()
-        self.panel = ChangesPanel(page_context(server, self.session, self.actions.post, folder))
+        with server.gui.add_folder("Changes and presets") as place:
+            self.panel = ChangesPanel(page_context(server, self.session, self.actions.post, folder))
+        self.person = Person(place, self.turn)
         self.turn()
 
     def turn(self):
@@ -30,13 +33,6 @@ class Bench:
         self.panel.draw(Now(self.session.status()))
         self.panel.show(Now(self.session.status()))
         return notice
-
-    def post(self, handle, chosen):
-        event(handle, chosen)
-        return self.turn()
-
-    def press(self, button):
-        return self.post(self.panel._buttons, button)
 
     def change(self, **values):
         names = {"friction": FRICTION, "mass": MASS}
@@ -57,12 +53,12 @@ def bench(server, tmp_path):
 
 def test_undo_takes_back_what_anybody_changed_and_redo_brings_it_again(bench):
     bench.change(friction=0.1)
-    assert bench.press(UNDO) == ""
+    assert bench.person.press(UNDO) == ""
     assert bench.friction() == 0.57
-    assert bench.press(UNDO) == "nothing to undo: no live parameter was changed"
-    assert bench.press(REDO) == ""
+    assert bench.person.press(UNDO) == "nothing to undo: no live parameter was changed"
+    assert bench.person.press(REDO) == ""
     assert bench.friction() == 0.1
-    assert bench.press(REDO) == "nothing to redo"
+    assert bench.person.press(REDO) == "nothing to redo"
 
 
 def test_an_undo_that_the_session_refuses_can_be_asked_again(bench, monkeypatch):
@@ -73,70 +69,69 @@ def test_an_undo_that_the_session_refuses_can_be_asked_again(bench, monkeypatch)
 
     with monkeypatch.context() as patch:
         patch.setattr(bench.session, "set_parameters", refuse)
-        assert bench.press(UNDO) == "the solver process does not run"
-    assert bench.press(UNDO) == ""
+        assert bench.person.press(UNDO) == "the solver process does not run"
+    assert bench.person.press(UNDO) == ""
     assert bench.friction() == 0.57
 
 
 def test_a_preset_is_one_step_of_the_history(bench):
-    assert bench.post(bench.panel._preset, "frictionless") == ""
+    assert bench.person.enter("Preset", "frictionless") == ""
     assert {pair.static_friction for pair in bench.session.now.scene.pairs} == {0.0}
-    assert "No contact holds by friction" in bench.panel._about.content
-    bench.press(UNDO)
+    assert "No contact holds by friction" in bench.person.text
+    bench.person.press(UNDO)
     assert bench.session.now.scene == SOURCE.scene
 
 
 def test_the_list_tells_default_and_now_and_one_choice_leads_back(bench):
     bench.change(friction=0.1, mass=0.012)
-    content = bench.panel._list.content
+    content = bench.person.html
     assert "0.57 → <b>0.1</b>" in content
     assert "(on restart)" in content
     assert "30 g → <b>12 g</b>" in content
-    assert bench.panel._one.options[1:] == (FRICTION,)
-    assert bench.post(bench.panel._one, FRICTION) == ""
+    assert bench.person.options("Back to default")[1:] == (FRICTION,)
+    assert bench.person.enter("Back to default", FRICTION) == ""
     assert bench.friction() == 0.57
     assert value(bench.session.now.scene, MASS) == 0.012
 
 
 def test_all_back_keeps_the_pour_and_the_default_is_a_new_one(bench):
     bench.change(friction=0.1, mass=0.012)
-    bench.press(BACK)
+    bench.person.press(BACK)
     assert (bench.friction(), bench.session.asked) == (0.57, ["set_parameters"])
-    bench.press(DEFAULT)
+    bench.person.press(DEFAULT)
     assert bench.session.now.scene == SOURCE.scene
     assert bench.session.asked == ["set_parameters", "start"]
 
 
 def test_a_preset_of_ones_own_is_saved_offered_and_applied(bench, tmp_path):
     bench.change(friction=0.1, mass=0.012)
-    bench.panel._name.value = "my try"
-    bench.actions.post(bench.panel._save)
-    assert bench.turn() == ""
+    bench.person.enter("Name", "my try")
+    assert bench.person.press("Save as preset") == ""
     assert (tmp_path / "presets" / "my try.toml").is_file()
-    assert "my try (own)" in bench.panel._preset.options
+    assert "my try (own)" in bench.person.options("Preset")
     changed = bench.session.now.scene
-    bench.press(DEFAULT)
+    bench.person.press(DEFAULT)
     # It names the mass, which acts on restart: a new pour.
-    assert bench.post(bench.panel._preset, "my try (own)") == ""
+    assert bench.person.enter("Preset", "my try (own)") == ""
     assert bench.session.now.scene == changed
     assert bench.session.asked[-1] == "start"
 
 
 def test_a_button_that_is_not_there_does_nothing(bench):
-    assert bench.press("Delete everything") is None
+    assert bench.person.send("Changes", "Delete everything") == ""
     assert bench.session.asked == []
 
 
 @pytest.mark.parametrize("name", ["../../etc/passwd", "no such preset"])
 def test_a_preset_that_is_not_offered_is_refused(bench, name):
-    assert "there is none of that name" in bench.post(bench.panel._preset, name)
+    assert "there is none of that name" in bench.person.send("Preset", name)
     assert bench.session.asked == []
 
 
 def test_a_bad_file_is_one_line_and_changes_nothing(bench, tmp_path):
     (tmp_path / "presets").mkdir()
     (tmp_path / "presets" / "bad.toml").write_text("format = 1\n[values]\n'pair.*.*.static_friction' = 'much'\n")
-    assert "is not a number" in bench.post(bench.panel._preset, "bad (own)")
+    assert "is not a number" in bench.person.send("Preset", "bad (own)")
     assert bench.session.asked == []
 
 

@@ -23,6 +23,7 @@ from explorer.viewer.pour.chart import (
 from explorer.viewer.pour.motion_chart import MotionChart, MotionHistory
 from solver.observables.observable import Value
 from tests.explorer.viewer.page_session import page_context
+from tests.explorer.viewer.person import Person
 from tests.explorer.viewer.test_texts import STATUS
 
 FRICTION = "pair.bead.bead.static_friction: 0.3 → 0.1"
@@ -106,16 +107,25 @@ def test_energy_and_contacts_follow_the_statuses_and_begin_again():
     assert history.drawn(())[0].tolist() == [0.1]
 
 
+def placed(server, kind):
+    """A chart on the page, and the curves that a person sees there."""
+    with server.gui.add_folder("chart") as place:
+        chart = kind(page_context(server))
+    (curves,) = Person(place).curves
+    return chart, curves
+
+
 def test_the_spread_is_a_band_between_its_ends(server):
-    plot = Chart(page_context(server))._plot
-    (band,) = plot.bands
-    assert [plot.series[k]["label"] for k in band["series"]] == ["+ spread", "− spread over flanks"]
+    _, curves = placed(server, Chart)
+    (band,) = curves.bands
+    assert [curves.series[k]["label"] for k in band["series"]] == ["+ spread", "− spread over flanks"]
 
 
-def test_a_change_reaches_both_charts_of_the_page(server):
-    for chart in (Chart(page_context(server)), MotionChart(page_context(server))):
-        chart.show(Now(STATUS))
-        assert chart._plot.data[-1].sum() == 0
-        chart.show(Now(STATUS, events=[change(1.2)]))
-        assert chart._plot.data[0][chart._plot.data[-1] == 1].tolist() == [1.2]
-        assert chart._plot.series[-1]["label"] == f"1.20 s {FRICTION}"
+@pytest.mark.parametrize("kind", [Chart, MotionChart])
+def test_a_change_reaches_both_charts_of_the_page(server, kind):
+    chart, curves = placed(server, kind)
+    chart.show(Now(STATUS))
+    assert curves.data[-1].sum() == 0
+    chart.show(Now(STATUS, events=[change(1.2)]))
+    assert curves.data[0][curves.data[-1] == 1].tolist() == [1.2]
+    assert curves.series[-1]["label"] == f"1.20 s {FRICTION}"

@@ -3,7 +3,6 @@
 import io
 import zipfile
 from dataclasses import replace
-from html import unescape
 
 import pytest
 
@@ -16,30 +15,29 @@ from explorer.viewer.pour.import_panel import PROGRAMS, ImportPanel
 from tests.explorer.command_line import explorer
 from tests.explorer.imported.test_imported import EDEM, LIGGGHTS, YADE
 from tests.explorer.viewer.page_session import PageSession, finished, page_context
+from tests.explorer.viewer.person import Person
 
 TEXTS = {"liggghts": LIGGGHTS, "yade": YADE, "edem": EDEM}
 CHOICES = {program: choice for choice, program in PROGRAMS.items()}
+NAME, UPLOAD, POUR = "Name of the material", "Upload it and read", "Pour this material"
 
 
 class Form:
     """The form with a person at it."""
 
     def __init__(self, server, folder):
-        self.actions, self.folder = Actions(), folder / "project"
+        actions, self.folder = Actions(), folder / "project"
         self.session = PageSession(material_source("sunflower_extract"))
-        page = page_context(server, self.session, self.actions.post, folder / "data")
+        page = page_context(server, self.session, actions.post, folder / "data")
         page = replace(page, project=replace(page.project, folder=self.folder))
-        self.background, self.panel = page.background, ImportPanel(page)
+        with server.gui.add_folder("From other programs") as place:
+            ImportPanel(page)
+        self.person = Person(place, lambda: finished(actions, page.background))
 
     def send(self, program, name, content):
         """The notice, "" where it is kept."""
-        self.panel._program.value = CHOICES[program]
-        self.actions.post(lambda: self.panel._take(name, content))
-        return finished(self.actions, self.background)
-
-    @property
-    def told(self):
-        return unescape(self.panel._told.content)
+        self.person.enter("File of", CHOICES[program])
+        return self.person.upload(UPLOAD, name, content)
 
 
 @pytest.fixture
@@ -53,7 +51,7 @@ def test_the_page_has_it():
 
 @pytest.mark.parametrize("program", TEXTS)
 def test_what_was_sent_is_kept_and_told_as_the_command_does(form, tmp_path, program):
-    form.panel._name.value = "mine"
+    form.person.enter(NAME, "mine")
     assert form.send(program, "in.beads", TEXTS[program].encode()) == ""
     (tmp_path / "in.beads").write_text(TEXTS[program])
     said = explorer("new", "material", "mine", f"--from-{program}", tmp_path / "in.beads", "--out", tmp_path).stdout
@@ -61,16 +59,14 @@ def test_what_was_sent_is_kept_and_told_as_the_command_does(form, tmp_path, prog
     notes = [line.removeprefix("note: ") for line in said.splitlines() if line.startswith("note: ")]
     assert notes
     for note in notes:
-        assert note in form.told
-    assert str(form.folder / "mine.toml") in form.told
+        assert note in form.person.text
+    assert str(form.folder / "mine.toml") in form.person.text
 
 
 def test_it_is_called_as_its_file_is_and_poured_by_a_press(form):
-    assert not form.panel._pour_it.visible
+    assert not form.person.sees(POUR)
     assert form.send("yade", "my beads.py", YADE.encode()) == ""
-    assert form.panel._pour_it.visible
-    form.actions.post(form.panel._pour)
-    assert finished(form.actions, form.background) == ""
+    assert form.person.press(POUR) == ""
     assert form.session.asked == ["start"]
     assert form.session.now.scene == load_scene("funnel", str(form.folder / "my_beads.toml"))
 
@@ -83,7 +79,7 @@ def test_a_folder_of_our_export_comes_as_an_archive(form, tmp_path):
         for file in (tmp_path / "export").iterdir():
             archive.write(file, f"table/{file.name}")
     assert form.send("edem", "table.zip", packed.getvalue()) == ""
-    assert "E = 2 G (1 + nu)" in form.told
+    assert "E = 2 G (1 + nu)" in form.person.text
     assert "petiole" in (form.folder / "table.toml").read_text()
 
 
@@ -110,8 +106,7 @@ def test_what_cannot_be_read_is_one_line_with_the_name_that_was_sent(form, progr
 def test_a_file_is_not_overwritten_and_a_name_is_one(form):
     assert form.send("edem", "maize.csv", EDEM.encode()) == ""
     assert "exists already" in form.send("edem", "maize.csv", EDEM.encode())
-    form.panel._name.value = "../maize"
+    form.person.enter(NAME, "../maize")
     assert "letters, digits" in form.send("edem", "maize.csv", EDEM.encode())
-    form.panel._program._impl.value = "Excel"  # as a browser that keeps to no list
-    form.actions.post(lambda: form.panel._take("a.xls", b"x"))
-    assert "allowed are LIGGGHTS" in finished(form.actions, form.background)
+    form.person.send("File of", "Excel")
+    assert "allowed are LIGGGHTS" in form.person.upload(UPLOAD, "a.xls", b"x")

@@ -1,6 +1,7 @@
 """What the page makes of parameters, and what it takes from a browser."""
 
 import math
+from collections import Counter
 from types import SimpleNamespace
 
 import numpy as np
@@ -24,12 +25,13 @@ from explorer.viewer.pour.live_panel import (
     material_targets,
     pair_targets,
 )
-from explorer.viewer.pour.restart_panel import PATHS, SetUpInputs, entered, size_paths
+from explorer.viewer.pour.restart_panel import PATHS, SetUpInputs, entered, label, size_paths
 from solver import load_material, parameters, with_values
 from solver.rigs import RIGS
 from solver.scenes.scene import value, with_rig
 from solver.scenes.sizes import SizeDistribution
-from tests.explorer.viewer.page_session import PageSession, event, page_context
+from tests.explorer.viewer.page_session import PageSession, page_context
+from tests.explorer.viewer.person import Person
 
 SCENE = load_material("sunflower_extract")
 KNOWN = parameters(SCENE)
@@ -85,17 +87,21 @@ def test_what_acts_on_restart_is_declared_so():
     assert [path for path in PATHS if path in KNOWN and KNOWN[path].live] == []
 
 
+def set_up(server, scene=SCENE):
+    """The inputs of the set-up, a person at them, and a list of the scenes that are poured."""
+    first, started = Status(SessionState.RUNNING, "", scene, seed=1, generation=1, speed=1.0), []
+    session = SimpleNamespace(status=lambda: first, restart=lambda made, seed: started.append(made))
+    with server.gui.add_folder("set-up") as place:
+        panel = SetUpInputs(server, session, scene, 1, lambda action: action())
+    return panel, Person(place), started
+
+
 def test_sizes_of_every_component_are_in_the_set_up(server):
-    first = Status(SessionState.RUNNING, "", SCENE, seed=1, generation=1, speed=1.0)
-    started = []
-    session = type(
-        "Session", (), {"status": lambda _: first, "restart": lambda _, scene, seed: started.append(scene)}
-    )()
-    panel = SetUpInputs(server, session, SCENE, 1, lambda action: action())
+    panel, person, started = set_up(server)
     assert [path for path in size_paths(SCENE) if KNOWN[path].live] == []
-    panel._inputs["body.plate.size_distribution"].value = "log_normal"
-    panel._inputs["body.plate.size_spread"].value = 0.2
-    panel._restart()
+    person.enter("Plate: size distribution", "log_normal")
+    person.enter("Plate: size spread", 0.2)
+    person.press("Restart with this set-up")
     assert [body.sizes for body in started[0].bodies] == [
         SizeDistribution(),
         SizeDistribution("log_normal", 0.2),
@@ -104,21 +110,20 @@ def test_sizes_of_every_component_are_in_the_set_up(server):
     # a number of spheres that was set elsewhere is offered beside the names
     other = with_values(SCENE, {"body.spheres": 12})
     panel.show(Status(SessionState.RUNNING, "", other, seed=1, generation=2, speed=1.0))
-    assert panel._inputs["body.spheres"].value == "12"
+    assert person.value("Spheres") == "12"
+    assert person.options("Spheres") == (*KNOWN["body.spheres"].choices, "12")
 
 
 @pytest.mark.parametrize("rig", RIGS)
 def test_all_of_rig_and_feed_is_in_the_set_up(server, rig):
-    scene, started = with_rig(SCENE, rig), []
-    first = Status(SessionState.RUNNING, "", scene, seed=1, generation=1, speed=1.0)
-    session = type("Session", (), {"status": lambda _: first, "restart": lambda _, made, seed: started.append(made)})()
-    panel = SetUpInputs(server, session, scene, 1, lambda action: action())
+    scene = with_rig(SCENE, rig)
+    _, person, started = set_up(server, scene)
     known = parameters(scene).items()
     # A file is chosen or uploaded elsewhere (`scene_panel`).
-    declared = {path for path, entry in known if path.startswith(("rig.", "insertion.")) and not entry.files}
-    assert declared <= set(panel._inputs)
+    declared = [label(entry) for path, entry in known if path.startswith(("rig.", "insertion.")) and not entry.files]
+    assert Counter(declared) <= Counter(person.labels)
     # What nobody touched stays as it is, to the last bit.
-    panel._restart()
+    person.press("Restart with this set-up")
     assert started == [scene]
 
 
@@ -132,17 +137,13 @@ def test_settings_of_the_next_pour_are_clamped_and_choices_checked():
 
 
 def test_the_set_up_follows_a_pour_that_somebody_else_started(server):
-    first = Status(SessionState.RUNNING, "", SCENE, seed=1, generation=1, speed=1.0)
-    session = type("Session", (), {"status": lambda _: first})()
-    panel = SetUpInputs(server, session, SCENE, 1, lambda action: action())
-    panel._inputs["rig.mass"].value = 12.0
-    panel.show(first)
-    assert panel._inputs["rig.mass"].value == 12.0  # typed, and not yet asked for
+    panel, person, _ = set_up(server)
+    person.enter("Mass [g]", 12.0)
+    panel.show(Status(SessionState.RUNNING, "", SCENE, seed=1, generation=1, speed=1.0))
+    assert person.value("Mass [g]") == 12.0  # typed, and not yet asked for
     other = with_values(SCENE, {"rig.mass": "20g", "body.spheres": "coarse"})
     panel.show(Status(SessionState.RUNNING, "", other, seed=7, generation=2, speed=1.0))
-    assert panel._inputs["rig.mass"].value == 20.0
-    assert panel._inputs["body.spheres"].value == "coarse"
-    assert panel._seed.value == 7
+    assert [person.value(words) for words in ("Mass [g]", "Spheres", "Seed")] == [20.0, "coarse", 7]
 
 
 def test_the_solvers_values_are_shown_as_a_range_where_they_differ():
@@ -152,12 +153,23 @@ def test_the_solvers_values_are_shown_as_a_range_where_they_differ():
     assert "0.57 … " not in echo_html(SCENE, pair_targets(SCENE)["seed – seed"])
 
 
+MIXED = "Static friction (mixed) ×"
+
+
 @pytest.fixture
 def sections(server):
-    """The panel's sections with a session that takes everything over at once, and what it was sent."""
+    """A person at the sections, with a session that takes everything over at once."""
     session = PageSession(material_source("sunflower_extract"))
-    made = LiveSections(server, session, SCENE, lambda action: action())
-    return SimpleNamespace(pairs=made._sections[0], bodies=made._sections[1], session=session, show=made.show)
+    with server.gui.add_folder("sections") as place:
+        made = LiveSections(server, session, SCENE, lambda action: action())
+    pairs, bodies = (Person(place).within(f"{kind} (acts now)") for kind in ("Pair", "Material"))
+    return SimpleNamespace(pairs=pairs, bodies=bodies, session=session, show=lambda: made.show(session.now))
+
+
+@pytest.fixture
+def let_go(monkeypatch):
+    """A call lets the time pass after which a control that a person moved follows the solver again."""
+    return lambda: monkeypatch.setattr("explorer.viewer.pour.live_panel.HANDS_OFF", 0.0)
 
 
 def friction(session):
@@ -165,45 +177,49 @@ def friction(session):
 
 
 def test_pairs_that_differ_are_mixed_and_scaled_with_their_ratios_kept(sections):
-    before, slider = friction(sections.session), sections.pairs._live[0]._faces[0].handle
-    assert "mixed" in slider.label
-    assert slider.value == 1.0
+    before, pairs = friction(sections.session), sections.pairs
+    assert pairs.value(MIXED) == 1.0
     assert len(set(before)) > 1
     # One press of an arrow key: a hundredth, and not nine equal pairs.
-    event(slider, 1.01)
+    pairs.enter(MIXED, 1.01)
     assert friction(sections.session) == pytest.approx(1.01 * before)
-    event(slider, slider.max)
+    pairs.enter(MIXED, pairs.control(MIXED).max)
     assert friction(sections.session).max() <= 3.0
     assert friction(sections.session) / friction(sections.session)[0] == pytest.approx(before / before[0])
 
 
-def test_a_factor_of_zero_leads_back_to_the_ratios(sections):
-    before, slider = friction(sections.session), sections.pairs._live[0]._faces[0].handle
-    event(slider, 0.0)
+def test_a_factor_of_zero_leads_back_to_the_ratios(sections, let_go):
+    before = friction(sections.session)
+    sections.pairs.enter(MIXED, 0.0)
     assert not friction(sections.session).any()
-    sections.pairs._live[0]._touched = -math.inf
-    sections.show(sections.session.now)
-    event(sections.pairs._live[0]._faces[0].handle, 0.5)
+    let_go()
+    sections.show()
+    sections.pairs.enter(MIXED, 0.5)
     assert friction(sections.session) == pytest.approx(0.5 * before)
 
 
-def test_the_control_is_another_one_once_the_values_agree_and_back(sections):
+def test_the_control_is_another_one_once_the_values_agree_and_back(sections, let_go):
+    pairs = sections.pairs
     sections.session.set_parameters({f"pair.{pair.a}.{pair.b}.static_friction": 0.4 for pair in SCENE.pairs})
-    sections.show(sections.session.now)
-    slider = sections.pairs._live[0]._faces[0].handle
-    assert (slider.label, slider.value) == ("Static friction", 0.4)
-    event(slider, 0.6)
+    sections.show()
+    assert not pairs.sees(MIXED)
+    assert pairs.value("Static friction") == 0.4
+    pairs.enter("Static friction", 0.6)
     assert (friction(sections.session) == 0.6).all()
     sections.session.set_parameters({"pair.seed.seed.static_friction": 0.3})
-    sections.pairs._live[0]._touched = -math.inf
-    sections.show(sections.session.now)
-    assert "mixed" in sections.pairs._live[0]._faces[0].handle.label
+    sections.show()
+    assert not pairs.sees(MIXED)  # not under a person's hand
+    let_go()
+    sections.show()
+    assert pairs.sees(MIXED)
+    assert not pairs.sees("Static friction")
 
 
 def test_moduli_that_differ_are_scaled_too(sections):
-    slider = sections.bodies._live[0]._faces[0].handle
+    decades = "Shear modulus (mixed), decades"
+    slider = sections.bodies.control(decades)
     assert (slider.value, slider.min, slider.max) == (0.0, -2.0, 2.0)
-    event(slider, math.log10(2.0))
+    sections.bodies.enter(decades, math.log10(2.0))
     found = [value(sections.session.now.scene, f"material.{name}.shear_modulus") for name in ("seed", "plate")]
     assert found == pytest.approx([2 * 56.3e6, 2 * 35.5e6])
 
@@ -221,49 +237,51 @@ def test_a_logarithmic_slider_spans_whole_decades_within_the_range():
     assert [decade_mark(power) for power in (-1, 0, 2, 3, 4)] == ["0.1", "1", "100", "10³", "10⁴"]
 
 
+BOX, POWER = "Shear modulus [MPa]", "log₁₀ of MPa"
+
+
 def control(server, name, prefix="material.seed"):
-    sent = []
-    path = f"{prefix}.{name}"
-    made = LiveControl(server.gui, KNOWN[path], [path], SCENE, lambda action: action(), sent.append)
-    return made, sent, path
+    """A control of one parameter, a person at it, a list of what is sent to the solver, and the parameter's path."""
+    sent, path = [], f"{prefix}.{name}"
+    with server.gui.add_folder("control") as place:
+        made = LiveControl(server.gui, KNOWN[path], [path], SCENE, lambda action: action(), sent.append)
+    return made, Person(place), sent, path
 
 
 def test_moving_the_box_and_the_logarithmic_slider_sends_pascals(server):
-    made, sent, path = control(server, "shear_modulus")
-    box, slider = (face.handle for face in made._faces)
-    event(box, 80.0)
-    event(slider, 2.0)
-    event(slider, 99.0)
+    _, person, sent, path = control(server, "shear_modulus")
+    person.enter(BOX, 80.0)
+    person.enter(POWER, 2.0)
+    person.send(POWER, 99.0)
     assert [values[path] for values in sent] == pytest.approx([80e6, 100e6, 1e9])
-    made.remove()
 
 
 def test_a_power_of_ten_is_shown_with_the_digits_that_its_box_holds(server):
-    made, _, _ = control(server, "shear_modulus")
+    made, person, _, _ = control(server, "shear_modulus")
     # log10(56.3) = 1.7505
-    assert made._faces[1].handle.value == 1.75
+    assert person.value(POWER) == 1.75
     made.follow(with_values(SCENE, {"material.seed.shear_modulus": 47.3e6}))
-    assert made._faces[1].handle.value == 1.67
-    assert made._faces[0].handle.value == 47.3
-    made.remove()
+    assert person.value(POWER) == 1.67
+    assert person.value(BOX) == 47.3
 
 
 def test_what_the_program_sets_itself_is_not_sent_back(server):
-    made, sent, _ = control(server, "static_friction", "pair.seed.seed")
-    event(made._faces[0].handle, 0.1, client_id=None)
+    _, person, sent, _ = control(server, "static_friction", "pair.seed.seed")
+    person.control("Static friction").value = 0.1
     assert sent == []
-    made.remove()
 
 
-def test_a_control_follows_the_solver_unless_a_person_is_at_it(server):
-    made, _, path = control(server, "static_friction", "pair.seed.seed")
+def test_a_control_follows_the_solver_unless_a_person_is_at_it(server, let_go):
+    made, person, _, path = control(server, "static_friction", "pair.seed.seed")
     changed = with_values(SCENE, {path: 0.2})
     made.follow(changed)
-    assert made._faces[0].handle.value == 0.2
-    event(made._faces[0].handle, 1.5)
+    assert person.value("Static friction") == 0.2
+    person.enter("Static friction", 1.5)
     made.follow(SCENE)
-    assert made._faces[0].handle.value == 0.2
-    made.remove()
+    assert person.value("Static friction") == 1.5
+    let_go()
+    made.follow(SCENE)
+    assert person.value("Static friction") == value(SCENE, path)
 
 
 def test_actions_run_in_order_and_a_refusal_becomes_the_notice():
@@ -296,15 +314,17 @@ def test_a_mistake_in_the_program_is_not_taken_for_bad_input():
 
 def test_the_feed_rate_beside_the_sliders_is_that_of_the_pour_whoever_began_it(server):
     session = PageSession(material_source("sunflower_extract"))
-    panel = ControlsPanel(page_context(server, session))
-    controls, path = panel._controls, "insertion.rate"
-    assert controls._feed.value == pytest.approx(1e3 * value(session.now.scene, path))
+    with server.gui.add_folder("controls") as place:
+        panel = ControlsPanel(page_context(server, session))
+    person, feed, path = Person(place), "Feed rate [g/s]", "insertion.rate"
+    assert person.value(feed) == pytest.approx(1e3 * value(session.now.scene, path))
     # Another browser, or Set-up, pours with another feed; pouring again here keeps it.
     session.restart(with_values(session.now.scene, {path: 0.035}))
     panel.show(Now(session.now))
-    assert controls._feed.value == pytest.approx(35.0)
-    controls._pour(1)
-    assert value(session.now.scene, path) == 0.035
-    controls._feed.value = 15.0
-    controls._pour(0)
+    assert person.value(feed) == pytest.approx(35.0)
+    person.press("New seed")
+    assert (value(session.now.scene, path), session.now.seed) == (0.035, 2)
+    person.enter(feed, 15.0)
+    person.press("Same seed")
     assert value(session.now.scene, path) == pytest.approx(0.015)
+    assert session.now.seed == 2

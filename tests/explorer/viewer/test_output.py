@@ -6,7 +6,6 @@ import re
 import urllib.error
 import urllib.request
 import zipfile
-from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -38,35 +37,21 @@ from explorer.viewer.output.picture import (
     rendered,
 )
 from explorer.viewer.output.recording_panel import DOWNLOAD, REPLAY, START, STOP, RecordingPanel
-from explorer.viewer.output.recording_switch import BYTES_PER_BODY, HTML, RRD, RecordingState, session_recorder
+from explorer.viewer.output.recording_switch import (
+    BYTES_PER_BODY,
+    HTML,
+    RRD,
+    RecordingState,
+    RecordingSwitch,
+    session_recorder,
+)
 from explorer.viewer.output.send_file import send_file, send_files
 from explorer.viewer.palette import BODY_COLOURS, STILL, VIRIDIS
 from explorer.viewer.panel import Now
-from tests.explorer.viewer.page_session import PageSession, event, finished, frame_of, page_context
+from tests.explorer.viewer.page_session import PageSession, finished, frame_of, page_context
+from tests.explorer.viewer.person import Browser, Person
 
 SOURCE = material_source("sunflower_extract")
-
-
-class Browser:
-    """What is asked of a client: its size, its picture, and files for it."""
-
-    def __init__(self, error=None):
-        self.sent, self.error = {}, error
-        nothing = SimpleNamespace(buffer_lock=nullcontext(), message_from_id={})
-        self._websock_connection = SimpleNamespace(get_message_buffer=lambda: nothing)
-        self.camera = SimpleNamespace(
-            image_height=90, image_width=5120, position=np.array([0.0, -0.5, 0.0]), look_at=np.zeros(3), fov=0.6
-        )
-
-    def send_file_download(self, name, content, save_immediately):
-        assert save_immediately
-        self.sent[name] = content
-
-    def get_render(self, height, width, transport_format, timeout):
-        if self.error:
-            raise self.error
-        assert transport_format == "png"
-        return np.zeros((height, width, 4), dtype=np.uint8)  # nothing but what is transparent
 
 
 class FileRecorder:
@@ -87,22 +72,35 @@ class FileRecorder:
 
 
 class Bench:
+    """The panels of the tab with a person at them, whose browser the files are sent to."""
+
     def __init__(self, server, folder, recorder=FileRecorder):
         self.session, self.actions, self.browser = PageSession(SOURCE), Actions(), Browser()
         self.session.newest = frame_of([0, 1, 2], [[0.0, 0.0, 0.01 * k] for k in range(3)])
         page = page_context(server, self.session, self.actions.post, folder)
-        self.recording, self.background = page.recording, page.background
-        self.recording._open_rrd = recorder
-        self.panel, self.engine, self.switch = OutputPanel(page), EngineExport(page), RecordingPanel(page)
+        self.background, self.look = page.background, page.look
+        self.recording = RecordingSwitch(server, folder / "recordings", page.background, recorder)
+        page.__dict__["recording"] = self.recording
+        with server.gui.add_folder("files") as files:
+            self.panel = OutputPanel(page)
+            EngineExport(page)
+        with server.gui.add_folder("recording") as recording:
+            self.switch = RecordingPanel(page)
+        self.files, self.recorder = (Person(place, self.finished, self.browser) for place in (files, recording))
 
-    def press(self, label):
-        button = self.panel._exports.get(label, self.panel._picture.button)
-        event(button, True, client=self.browser)
+    def finished(self):
         return finished(self.actions, self.background)
 
     def record(self, chosen):
-        event(self.switch._switch, chosen, client=self.browser)
-        return finished(self.actions, self.background)
+        """Press a button of the recording that is there now. The line of a refusal."""
+        self.told()
+        return self.recorder.press(chosen)
+
+    def record_late(self, chosen):
+        """Press one that is no more or not yet there, at a page that was not told so. The line of a refusal."""
+        self.told()
+        assert chosen not in self.recorder.options("Record")
+        return self.recorder.send("Record", chosen)
 
     def take(self, times):
         for number in range(times):
@@ -118,8 +116,9 @@ class Bench:
             self.recording.take(replace(frame, time=time), status)
 
     def told(self):
+        """What the page says of the recording now."""
         self.switch.show(Now(self.session.status()))
-        return self.switch._state.content
+        return self.recorder.text
 
 
 @pytest.fixture
@@ -133,16 +132,12 @@ def recorded(server, tmp_path):
     return Bench(server, tmp_path / "recordings", session_recorder)
 
 
-def shown(html):
-    return re.sub("<[^>]*>", "", html)
-
-
 def test_the_command_line_follows_what_is_on_the_screen(bench):
     bench.panel.show(Now(bench.session.status()))
-    assert shown(bench.panel._command.content) == "explorer simulate sunflower_extract --seed 1"
+    assert "in force: explorer simulate sunflower_extract --seed 1 **Files of" in bench.files.text
     bench.session.set_parameters({"pair.seed.seed.static_friction": 0.2})
     bench.panel.show(Now(bench.session.status()))
-    assert "--set pair.seed.seed.static_friction=0.2" in bench.panel._command.content
+    assert "--set pair.seed.seed.static_friction=0.2" in bench.files.text
 
 
 def test_the_pour_is_exported_for_another_program(bench, monkeypatch):
@@ -150,10 +145,8 @@ def test_the_pour_is_exported_for_another_program(bench, monkeypatch):
     monkeypatch.setattr(
         "explorer.viewer.output.engine_export.packed_export", lambda scene, *order: asked.append(order) or b"zip"
     )
-    engine = bench.engine
-    engine._program.value = "yade"
-    event(engine._button, True, client=bench.browser)
-    assert finished(bench.actions, bench.background) == ""
+    bench.files.enter("For another program", "yade")
+    assert bench.files.press("Export (ZIP)") == ""
     assert asked == [("yade", 1)]
     assert bench.browser.sent == {"pour_yade.zip": b"zip"}
 
@@ -166,45 +159,43 @@ def test_the_command_line_is_escaped_and_its_absence_explained():
 
 def test_the_scene_file_is_the_scene_on_the_screen(bench, tmp_path):
     bench.session.set_parameters({"pair.seed.seed.static_friction": 1 / 3})
-    assert bench.press("Scene (TOML)") == ""
+    assert bench.files.press("Scene (TOML)") == ""
     (tmp_path / "scene.toml").write_bytes(bench.browser.sent["scene.toml"])
     assert load_scene(str(tmp_path / "scene.toml")) == bench.session.now.scene
 
 
 def test_bodies_are_sent_as_table_and_mesh(bench):
-    assert bench.press("Bodies (CSV)") == bench.press("Bodies (STL)") == ""
+    assert bench.files.press("Bodies (CSV)") == bench.files.press("Bodies (STL)") == ""
     assert len(bench.browser.sent["bodies_1.250s.csv"].splitlines()) == 4
     assert len(bench.browser.sent["bodies_1.250s_mm.stl"]) > 1000
     bench.session.newest = None
-    assert bench.press("Bodies (CSV)") == "no body has entered yet"
+    assert bench.files.press("Bodies (CSV)") == "no body has entered yet"
 
 
 def taken(bench):
     """The picture that the browser was sent, as RGBA or RGB."""
-    assert bench.press("Picture (PNG)") == ""
+    assert bench.files.press("Picture (PNG)") == ""
     return PIL.Image.open(io.BytesIO(bench.browser.sent.pop("picture_0.000s.png")))
 
 
 def test_a_picture_is_a_multiple_of_the_browser_up_to_a_limit(bench):
-    panel = bench.panel._picture
     assert taken(bench).size == (5120, 90)
-    panel._size.value = "4×"
+    bench.files.enter("Picture size", "4×")
     assert taken(bench).size == (7680, 135)  # 20480 would be too wide
     bench.browser.camera.image_width = 160
     assert taken(bench).size == (640, 360)
-    panel._size.value = "8×"
-    assert "picture size: '8×' is not one of 1×, 2×, 4×" in bench.press("Picture (PNG)")
+    bench.files.send("Picture size", "8×")
+    assert "picture size: '8×' is not one of 1×, 2×, 4×" in bench.files.press("Picture (PNG)")
 
 
 def test_a_picture_has_the_ground_that_was_chosen(bench):
-    panel = bench.panel._picture
     bench.browser.camera.image_width = 160
     for ground, corner in (
         (DARK_GROUND, (20, 20, 20)),
         (WHITE_GROUND, (255, 255, 255)),
         (NO_GROUND, (255, 255, 255, 0)),
     ):
-        panel._ground.value = ground
+        bench.files.enter("Picture background", ground)
         assert taken(bench).getpixel((159, 89)) == corner
 
 
@@ -248,13 +239,15 @@ def test_the_key_shows_components_colours_and_thickness():
     assert STILL not in colours(Legend(colours=replace(key, still="")))
 
 
-def test_the_key_of_a_picture_is_that_of_the_page(bench):
-    assert bench.panel._legend() == Legend(
-        [("seed", BODY_COLOURS[0]), ("plate", BODY_COLOURS[1]), ("petiole", BODY_COLOURS[2])]
-    )
-    bench.panel._look.change(colour_by="speed", automatic=False, low=1.0, high=3.0, logarithmic=False)
-    legend = bench.panel._legend()
-    assert (legend.components, legend.colours.numbers) == ((), (1.0, 2.0, 3.0))
+def test_the_key_of_a_picture_is_that_of_the_page(bench, monkeypatch):
+    legends = []
+    monkeypatch.setattr("explorer.viewer.output.picture.picture", lambda *order: legends.append(order[-1]) or b"png")
+    assert bench.files.press("Picture (PNG)") == ""
+    bench.look.change(colour_by="speed", automatic=False, low=1.0, high=3.0, logarithmic=False)
+    assert bench.files.press("Picture (PNG)") == ""
+    components, quantity = legends
+    assert components == Legend([("seed", BODY_COLOURS[0]), ("plate", BODY_COLOURS[1]), ("petiole", BODY_COLOURS[2])])
+    assert (quantity.components, quantity.colours.numbers) == ((), (1.0, 2.0, 3.0))
 
 
 @pytest.mark.parametrize("error", [TimeoutError("too slow"), RuntimeError("gone")])
@@ -264,20 +257,19 @@ def test_a_browser_that_draws_no_picture_is_one_line(error):
 
 
 def test_a_recording_is_begun_ended_and_sent(bench):
-    assert bench.record(STOP) == "recording: none is running"
-    assert bench.record(DOWNLOAD) == "recording: nothing was recorded yet"
+    assert bench.record_late(STOP) == "recording: none is running"
+    assert bench.record_late(DOWNLOAD) == "recording: nothing was recorded yet"
     assert bench.record(START) == ""
-    assert "one is running" in bench.record(START)
+    assert "one is running" in bench.record_late(START)
     bench.take(3)
-    bench.switch.show(Now(bench.session.status()))
-    assert re.search(rf"● REC \d:\d\d: into {re.escape(str(bench.recording.path))}", bench.switch._state.content)
-    assert "stop it first" in bench.record(DOWNLOAD)
+    assert re.search(rf"● REC \d:\d\d: into {re.escape(str(bench.recording.path))}", bench.told())
+    assert "stop it first" in bench.record_late(DOWNLOAD)
     assert bench.record(STOP) == ""
     bench.take(2)
     assert bench.record(DOWNLOAD) == ""
     path = bench.recording.path
     assert bench.browser.sent == {path.name: b"3 frames"}
-    assert f"1 pour recorded:<br>{path}: 1.000 s" in bench.told()
+    assert f"1 pour recorded: {path}: 1.000 s" in bench.told()
 
 
 def test_a_pour_that_is_begun_while_recording_is_what_is_downloaded(recorded, tmp_path):
@@ -312,24 +304,24 @@ def test_a_pour_that_is_begun_while_recording_is_what_is_downloaded(recorded, tm
 
 def test_what_is_recorded_is_replayed_without_another_server(recorded):
     """Record, restart, stop, replay: both pours have a page, and the page shows what was recorded."""
-    assert recorded.record(REPLAY) == "recording: nothing was recorded yet"
+    assert recorded.record_late(REPLAY) == "recording: nothing was recorded yet"
     assert recorded.record(START) == ""
     recorded.pour([0.0, 0.1, 0.2])
     recorded.session.restart()
     recorded.pour([0.0, 0.05])
-    assert "stop it first" in recorded.record(REPLAY)
+    assert "stop it first" in recorded.record_late(REPLAY)
     assert recorded.record(STOP) == ""
     assert recorded.record(REPLAY) == ""
-    replays = recorded.switch._replays
-    assert [one.seconds for one in replays] == pytest.approx([0.2, 0.05])
-    for one in replays:
-        assert f"<a href='{one.address}'" in recorded.told()
-        with urllib.request.urlopen(one.address, timeout=10.0) as answer:
+    assert "Replay pour 1 (0.200 s) Replay pour 2 (0.050 s)" in recorded.told()
+    addresses = re.findall(r"<a href='([^']+)'", recorded.recorder.html)
+    assert len(addresses) == 2
+    for address in addresses:
+        with urllib.request.urlopen(address, timeout=10.0) as answer:
             assert b"<html" in answer.read()
     recorded.switch.close()
-    assert recorded.switch._replays == []
+    assert "Replay pour" not in recorded.told()
     with pytest.raises(urllib.error.URLError):
-        urllib.request.urlopen(replays[0].address, timeout=10.0)
+        urllib.request.urlopen(addresses[0], timeout=10.0)
 
 
 def test_the_state_of_a_recording_is_told_in_words(bench):
@@ -374,7 +366,7 @@ def test_a_recording_without_a_frame_is_none(recorded):
 
 
 def test_the_scene_as_a_web_page_holds_what_moved(server, bench):
-    bench.switch._kind.value = HTML
+    bench.recorder.enter("Kind", HTML)
     node = server.scene.add_frame("/moving")
     assert bench.record(START) == ""
     for k in range(3):
@@ -392,24 +384,24 @@ def test_the_scene_as_a_web_page_holds_what_moved(server, bench):
 
 def test_a_web_page_that_is_full_is_ended_and_written(bench, monkeypatch):
     monkeypatch.setattr("explorer.viewer.output.recording_switch.MOST_BYTES", 2.5 * BYTES_PER_BODY)
-    bench.switch._kind.value = HTML
+    bench.recorder.enter("Kind", HTML)
     assert bench.record(START) == ""
     bench.take(2)
     assert bench.recording.running
     bench.take(4)
     assert not bench.recording.running
-    assert finished(bench.actions, bench.background) == ""
+    assert bench.finished() == ""
     assert "__VISER_EMBED_DATA__" in bench.recording.files()[0].read_text()
 
 
 def test_a_kind_that_is_not_offered_is_refused(bench):
-    bench.switch._kind.value = "<script>"
+    bench.recorder.send("Kind", "<script>")
     assert "allowed: " in bench.record(START)
     assert not bench.recording.running
 
 
 def test_the_end_of_the_page_leaves_a_whole_file(bench):
-    bench.switch._kind.value = RRD
+    bench.recorder.enter("Kind", RRD)
     assert bench.record(START) == ""
     bench.take(4)
     bench.recording.close()
@@ -419,17 +411,20 @@ def test_the_end_of_the_page_leaves_a_whole_file(bench):
 
 def test_texts_of_the_state_are_escaped(bench):
     bench.switch.show(Now(bench.session.status(), notice="<img src=x>"))
-    assert "<img" not in bench.switch._state.content
+    assert "&lt;img src=x&gt;" in bench.recorder.html
+    assert "<img" not in bench.recorder.html
+
+
+def test_a_button_of_the_recording_that_is_not_there_does_nothing(bench):
     assert bench.actions.carry_out() is None
-    assert bench.record("Delete everything") == ""
+    assert bench.record_late("Delete everything") == ""
     assert not bench.recording.running
 
 
 def test_all_files_of_an_answer_are_sent_together():
     """The buffer of a real browser holds the first file when the second is sent."""
     browser = Browser()
-    waiting = browser._websock_connection.get_message_buffer().message_from_id
-    send = browser.send_file_download
+    waiting, send = browser.waiting, browser.send_file_download
 
     def sent(name, content, save_immediately):
         send(name, content, save_immediately)

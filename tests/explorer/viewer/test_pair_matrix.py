@@ -7,26 +7,33 @@ import pytest
 
 from explorer.scene.source import material_source
 from explorer.units import InputError
-from explorer.viewer.pour.live_panel import BOXES, LivePanel, PairMatrix, matrix_html, pair_parameters, triangle
-from explorer.viewer.pour.restart_panel import RestartPanel
+from explorer.viewer.pour.live_panel import (
+    BOXES,
+    LivePanel,
+    PairMatrix,
+    matrix_html,
+    pair_parameters,
+    pair_targets,
+    triangle,
+)
+from explorer.viewer.pour.restart_panel import RestartPanel, label
 from solver.params import declared
 from solver.scenes.material import Pair
 from solver.scenes.scene import canonical, parameters, value, with_rig, with_values
 from tests.explorer.beads import bead_scene
-from tests.explorer.viewer.page_session import PageSession, event, page_context
+from tests.explorer.viewer.page_session import PageSession, page_context
+from tests.explorer.viewer.person import Person
 
 SOURCE = material_source("sunflower_extract")
 SCENE = SOURCE.scene
 
 
 def matrix(server, name="static_friction"):
+    """The matrix, a person at its boxes, and a list of what is sent to the solver."""
     sent = []
-    made = PairMatrix(server.gui, SCENE, name, lambda action: action(), sent.append)
-    return made, sent
-
-
-def row(made, name):
-    return next(one for one in made._rows if one.paths[0].startswith(f"pair.{name}."))
+    with server.gui.add_folder("matrix") as place:
+        made = PairMatrix(server.gui, SCENE, name, lambda action: action(), sent.append)
+    return made, Person(place), sent
 
 
 def many(count):
@@ -49,45 +56,44 @@ def test_all_that_pairs_have_is_there():
 
 
 def test_one_box_changes_one_pair(server):
-    made, sent = matrix(server)
-    petiole = row(made, "petiole")
-    assert petiole.handle.value == (0.54, 0.82, 0.83)
-    event(petiole.handle, (0.54, 0.3, 0.83))
+    _, person, sent = matrix(server)
+    assert person.value("petiole") == (0.54, 0.82, 0.83)
+    person.enter("petiole", (0.54, 0.3, 0.83))
     assert [{canonical(SCENE, path): number for path, number in values.items()} for values in sent] == [
         {"pair.plate.petiole.static_friction": 0.3}
     ]
-    event(row(made, "seed").handle, 0.2)
+    person.enter("seed", 0.2)
     assert sent[-1] == {"pair.seed.seed.static_friction": 0.2}
     # The same again is no change.
-    event(row(made, "seed").handle, 0.2)
+    person.enter("seed", 0.2)
     assert len(sent) == 2
 
 
 @pytest.mark.parametrize("sent_value", [(0.5, 0.6), (0.5, math.nan, 0.5), (0.5, "x", 0.5), None, {"a": 1}])
 def test_what_is_no_row_of_numbers_is_refused(server, sent_value):
-    made, sent = matrix(server)
+    _, person, sent = matrix(server)
     with pytest.raises(InputError):
-        event(row(made, "petiole").handle, sent_value)
+        person.send("petiole", sent_value)
     assert sent == []
 
 
 def test_a_number_out_of_range_is_taken_as_its_end(server):
-    made, sent = matrix(server, "restitution")
+    _, person, sent = matrix(server, "restitution")
     high = declared(Pair, "pair")["pair.restitution"].high
-    event(row(made, "plate").handle, (99.0, 0.56))
+    person.send("plate", (99.0, 0.56))
     assert sent == [{"pair.plate.seed.restitution": high}]
 
 
-def test_the_boxes_follow_the_solver_unless_a_person_is_at_the_row(server):
-    made, _ = matrix(server)
+def test_the_boxes_follow_the_solver_unless_a_person_is_at_the_row(server, monkeypatch):
+    made, person, _ = matrix(server)
     changed = with_values(SCENE, {"pair.seed.seed.static_friction": 0.1, "pair.plate.petiole.static_friction": 0.2})
-    event(row(made, "petiole").handle, (0.54, 0.3, 0.83))
+    person.enter("petiole", (0.54, 0.3, 0.83))
     made.follow(changed)
-    assert row(made, "seed").handle.value == 0.1
-    assert row(made, "petiole").handle.value == (0.54, 0.82, 0.83)
-    row(made, "petiole").touched = -math.inf
+    assert person.value("seed") == 0.1
+    assert person.value("petiole") == (0.54, 0.3, 0.83)
+    monkeypatch.setattr("explorer.viewer.pour.live_panel.HANDS_OFF", 0.0)  # the person has let go
     made.follow(changed)
-    assert row(made, "petiole").handle.value == (0.54, 0.2, 0.83)
+    assert person.value("petiole") == (0.54, 0.2, 0.83)
 
 
 def test_the_table_is_symmetric_and_tells_what_is_missing():
@@ -103,16 +109,24 @@ def test_the_table_is_symmetric_and_tells_what_is_missing():
 def test_panels_follow_a_scene_with_other_parameters(server):
     session = PageSession(SOURCE)
     page = page_context(server, session)
-    live, set_up = LivePanel(page), RestartPanel(page)
+    with server.gui.add_folder("live") as live_place:
+        live = LivePanel(page)
+    with server.gui.add_folder("set-up") as set_up_place:
+        set_up = RestartPanel(page)
+    at_live, at_set_up = Person(live_place), Person(set_up_place)
     first = live.controls(SCENE)
     assert live.controls(with_values(SCENE, {"pair.seed.seed.static_friction": 0.1})) is first
     drum = with_rig(SCENE, "rotating_drum")
-    assert "rig.speed_rpm" in set_up.controls(drum)._inputs
-    assert "rig.outlet_height" not in set_up.controls(drum)._inputs
+    height, speed = "Outlet height [mm]", label(parameters(drum)["rig.speed_rpm"])
+    assert (at_set_up.sees(height), at_set_up.sees(speed)) == (True, False)
+    set_up.controls(drum)
+    assert (at_set_up.sees(height), at_set_up.sees(speed)) == (False, True)
+    assert at_live.options("Pair") == tuple(pair_targets(SCENE))
     session.start(bead_scene(), 1)
     second = live.controls(bead_scene())
     assert second is not first
     second.show(session.status())
-    assert value(bead_scene(), "pair.bead.steel.static_friction") == row(second._matrices[0], "steel").handle.value
-    # The old widgets are gone from the page.
-    assert first._sections[0]._chooser._impl.removed
+    friction = at_live.within("Static friction of every pair (acts now)")
+    assert value(bead_scene(), "pair.bead.steel.static_friction") == friction.value("steel")
+    # There is one of them: the old controls are gone from the page.
+    assert at_live.options("Pair") == tuple(pair_targets(bead_scene()))

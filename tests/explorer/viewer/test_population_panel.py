@@ -10,14 +10,17 @@ from doe.population import Comparison, Population
 from doe.store import Store
 from explorer.background.command_process import CommandStatus
 from explorer.live.messages import SessionState, Status
+from explorer.population.process import PopulationProcess
 from explorer.scene.source import material_source
-from explorer.viewer.actions import Actions
+from explorer.viewer.actions import Actions, BackgroundWork
 from explorer.viewer.panel import Now
 from explorer.viewer.pour import population_panel
 from explorer.viewer.pour.population_panel import (
     BASE,
     DOT,
     MORE,
+    POUR_BOTH,
+    POUR_MORE,
     PopulationPanel,
     ThisPour,
     population_html,
@@ -29,11 +32,13 @@ from solver import Outcome, with_rig, with_values
 from solver.observables import Value
 from tests.doe.test_population import stored
 from tests.explorer.viewer.page_session import PageSession, finished, page_context
+from tests.explorer.viewer.person import Person
 
 SOURCE = material_source("sunflower_extract")
 FRICTION = "pair.seed.seed.static_friction"
 IDLE = CommandStatus("idle")
 PILE = ThisPour(21.7, 3, "", changed=False)
+CANCEL = "Cancel these pours"
 
 
 def population(*values, void=0):
@@ -121,27 +126,49 @@ def test_the_change_is_told_by_what_was_changed():
     assert told_difference(SOURCE.scene, with_rig(one, "rotating_drum")) == ""
 
 
+class FakePours(PopulationProcess):
+    """Reads the store, pours nothing, and remembers what it was asked for; ``now`` is what a test says of it."""
+
+    def __init__(self, folder, store, place):
+        super().__init__(folder, store, place=place)
+        self.asked, self.now = [], IDLE
+        self.status, self.cancel = lambda: self.now, lambda: self.asked.append("cancel")
+
+    def start(self, scene, pours):
+        self.asked.append((scene, pours))
+
+
 @pytest.fixture
 def table(server, tmp_path, monkeypatch):
-    """The panel with a store of two pours of the scene and three of a smoother one."""
+    """A person at the panel, with a store of two pours of the scene and three of a smoother one."""
+    session, actions, made = PageSession(SOURCE), Actions(), []
+    work = BackgroundWork(actions.post)
+
+    def process(*at, **more):
+        made.append(FakePours(*at, **more))
+        return made[0]
+
     monkeypatch.setattr(population_panel, "SETTLED", -1.0)
     monkeypatch.setattr(population_panel, "AGAIN", 0.0)
+    monkeypatch.setattr(population_panel, "BackgroundWork", lambda post: work)
+    monkeypatch.setattr(population_panel, "PopulationProcess", process)
     store = Store(tmp_path / "runs.sqlite")
     smooth = with_values(SOURCE.scene, {FRICTION: 0.2})
     for scene, angles in ((SOURCE.scene, (20.0, 24.0)), (smooth, (12.0, 13.0, 14.0))):
         for seed, angle in enumerate(angles):
             store.add(stored(scene, seed + 1, angle))
-    session, actions = PageSession(SOURCE), Actions()
     diagnosis = SimpleNamespace(store=tmp_path / "runs.sqlite")
-    panel = PopulationPanel(page_context(server, session, actions.post, tmp_path, diagnosis=diagnosis))
+    with server.gui.add_folder("population") as place:
+        panel = PopulationPanel(page_context(server, session, actions.post, tmp_path, diagnosis=diagnosis))
+    person = Person(place, actions.carry_out)
 
     def look():
         panel.show(Now(session.now))
-        finished(actions, panel._work)
+        finished(actions, work)
         panel.show(Now(session.now))
-        return text(panel._html.content)
+        return text(person.html)
 
-    yield SimpleNamespace(panel=panel, session=session, store=store, look=look)
+    yield SimpleNamespace(person=person, session=session, store=store, look=look, pours=made[0])
     panel.close()
     store.close()
 
@@ -182,33 +209,32 @@ def test_a_single_pour_of_new_parameters_is_held_against_them_too(table):
 
 
 def test_more_pours_are_asked_for_and_can_be_cancelled(table):
-    started = []
-    table.panel._process.start = lambda scene, pours: started.append((scene, pours))
-    table.panel._pour()
-    assert started == [(SOURCE.scene, MORE)]
-    table.panel._process.status = lambda: CommandStatus("running", done=3, planned=8, eta_s=64.0)
+    assert table.person.press(POUR_MORE) == ""
+    assert table.pours.asked == [(SOURCE.scene, MORE)]
+    table.pours.now = CommandStatus("running", done=3, planned=8, eta_s=64.0)
     assert "Pouring in the background: 3 of 8, time left 1 min 04 s." in table.look()
-    assert (table.panel._more.visible, table.panel._stop.visible) == (False, True)
+    assert table.person.labels == [CANCEL]
+    assert table.person.press(CANCEL) == ""
+    assert table.pours.asked[1:] == ["cancel"]
+    table.pours.now = IDLE
+    table.look()
+    assert table.person.labels == [POUR_MORE]
 
 
 def test_both_sides_of_a_change_are_poured_until_they_have_as_many(table):
     """Two stored pours before the change, three after it: five more of the new ones, then six of the former."""
-    started = []
-    table.panel._process.start = lambda scene, pours: started.append((scene.pairs, pours))
     table.look()
     table.session.set_parameters({FRICTION: 0.2})
     table.look()
-    assert table.panel._more.label == "Pour 8 of each"
-    table.panel._pour()
-    smooth = table.session.now.scene.pairs
-    assert started == [(smooth, MORE - 3)]
-    table.panel._process.status = lambda: CommandStatus("running", done=0, planned=5)
+    assert table.person.press("Pour 8 of each") == ""
+    assert table.pours.asked == [(table.session.now.scene, MORE - 3)]
+    table.pours.now = CommandStatus("running", done=0, planned=5)
     table.look()
-    assert len(started) == 1
-    table.panel._process.status = lambda: IDLE
+    assert len(table.pours.asked) == 1
+    table.pours.now = IDLE
     table.look()
-    assert started[1:] == [(SOURCE.scene.pairs, MORE - 2)]
-    table.panel._process.status = lambda: CommandStatus("running", done=1, planned=6, eta_s=64.0)
+    assert table.pours.asked[1:] == [(SOURCE.scene, MORE - 2)]
+    table.pours.now = CommandStatus("running", done=1, planned=6, eta_s=64.0)
     assert "Pouring in the background (the former parameters): 1 of 6" in table.look()
     # What is added to the former ones counts at once.
     for seed in (11, 12, 13, 14, 15, 16):
@@ -218,15 +244,16 @@ def test_both_sides_of_a_change_are_poured_until_they_have_as_many(table):
 
 
 def test_cancelled_pours_of_the_one_side_are_not_followed_by_those_of_the_other(table):
-    started = []
-    table.panel._process.start = lambda scene, pours: started.append(pours)
     table.look()
     table.session.set_parameters({FRICTION: 0.2})
     table.look()
-    table.panel._pour()
-    table.panel._cancel()
+    assert table.person.press(POUR_BOTH) == ""
+    table.pours.now = CommandStatus("running", done=0, planned=5)
     table.look()
-    assert started == [MORE - 3]
+    assert table.person.press(CANCEL) == ""
+    table.pours.now = IDLE
+    table.look()
+    assert table.pours.asked == [(table.session.now.scene, MORE - 3), "cancel"]
 
 
 def test_what_a_comparison_lacks_is_named():

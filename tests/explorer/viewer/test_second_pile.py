@@ -11,15 +11,17 @@ from explorer.diagnosis.piles import surface_of_revolution
 from explorer.live.frames import Frame
 from explorer.live.messages import SessionState, Status
 from explorer.scene.file import load_scene
+from explorer.scene.meshes import PLATE_NAME
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.look.camera import go_to_place
 from explorer.viewer.panel import Now
 from explorer.viewer.pour.beside_pile import BESIDE, ROOT, BesidePile, stand_aside
-from explorer.viewer.pour.second_pile import NONE, SecondPile, comparison_markdown
+from explorer.viewer.pour.second_pile import NONE, POUR_SECOND, SecondPile, comparison_markdown
 from explorer.viewer.scene_nodes import PLATE_RADIUS, SceneNodes
 from solver import Outcome, with_values
 from solver.observables import Value
 from tests.explorer.viewer.page_session import page_context
+from tests.explorer.viewer.person import Person, drawn
 
 SCENE = with_values(load_scene("funnel"), {"rig.mass": 2e-3, "body.spheres": "coarse"})
 
@@ -73,45 +75,58 @@ def frame(number):
 
 @pytest.fixture
 def bench():
-    """Server, first session, second session, and the panel; actions are carried out at once."""
+    """Server, both sessions, the piles, the panel and a person at it; actions are carried out at once."""
     server = guarded_server("127.0.0.1", 0, "test")
     first, second = FakeSession(), FakeSession()
     page = page_context(server, first)
     page.__dict__["beside"] = BesidePile(server, first, lambda: second)
-    panel = SecondPile(page)
-    yield SimpleNamespace(server=server, first=first, second=second, panel=panel)
+    with server.gui.add_folder("Second pile") as place:
+        panel = SecondPile(page)
+    person = Person(place)
+    yield SimpleNamespace(server=server, first=first, second=second, beside=page.beside, panel=panel, person=person)
     server.stop()
 
 
 def nodes(server):
     # The empty parents that viser makes by itself draw nothing.
     made = {f"{ROOT}/bodies", f"{ROOT}/rig"}
-    return {name for name in server.scene._handle_from_node_name if name.startswith(f"{ROOT}/")} - made
+    return drawn(server, f"{ROOT}/").keys() - made
+
+
+def signs(server):
+    """What stands above the piles, and where."""
+    return {sign.text: sign.position[0] for sign in drawn(server, "/names/").values()}
+
+
+def drawn_radius(server, root):
+    """Of the plate that is drawn below ``root`` [m]."""
+    (plate,) = drawn(server, f"{root}/rig/{PLATE_NAME}").values()
+    return np.hypot(*plate.vertices[:, :2].T).max() * plate.scale[0]
 
 
 def test_it_is_poured_with_the_first_one_s_scene_and_seed_and_drawn_beside_it(bench):
-    assert bench.panel._text.content == NONE
-    bench.panel._beside.pour_present()
+    assert bench.person.html == NONE
+    bench.person.press(POUR_SECOND)
     assert bench.second.told == [("start", SCENE, 4)]
     bench.second.newest = frame(1)
     bench.panel.draw(Now(bench.first.now))
     assert f"{ROOT}/rig/cone" in nodes(bench.server)
-    seeds = bench.server.scene._handle_from_node_name[f"{ROOT}/bodies/0"]
+    seeds = drawn(bench.server)[f"{ROOT}/bodies/0"]
     assert seeds.batched_positions[0] == pytest.approx([0.05] * 3)
-    assert bench.server.scene._handle_from_node_name[ROOT].position[0] == BESIDE
+    assert drawn(bench.server)[ROOT].position[0] == BESIDE
 
 
 def test_it_stays_as_it_was_while_the_first_is_changed_and_the_difference_is_told(bench):
-    bench.panel._beside.pour_present()
+    bench.person.press(POUR_SECOND)
     rougher = with_values(SCENE, {"pair.seed.seed.static_friction": 0.9})
     bench.first.now = replace(bench.first.now, scene=rougher)
     bench.panel.show(Now(bench.first.now))
-    assert "static friction seed–seed 0.57 → 0.9" in bench.panel._text.content
+    assert "static friction seed–seed 0.57 → 0.9" in bench.person.text
     assert bench.second.now.scene == SCENE
 
 
 def test_it_pauses_plays_and_keeps_speed_with_the_first(bench):
-    bench.panel._beside.pour_present()
+    bench.person.press(POUR_SECOND)
     bench.second.told.clear()
     bench.first.now = replace(bench.first.now, state=SessionState.PAUSED, speed=0.5)
     bench.panel.show(Now(bench.first.now))
@@ -125,7 +140,7 @@ def test_it_pauses_plays_and_keeps_speed_with_the_first(bench):
 
 
 def test_where_the_first_stands_still_the_second_comes_to_its_moment(bench):
-    bench.panel._beside.pour_present()
+    bench.person.press(POUR_SECOND)
     bench.second.told.clear()
     first = replace(bench.first.now, state=SessionState.PAUSED, time=0.5)
     for time, state, asked in (
@@ -146,14 +161,14 @@ def test_where_the_first_stands_still_the_second_comes_to_its_moment(bench):
 
 
 def test_taken_away_it_leaves_nothing(bench):
-    bench.panel._beside.pour_present()
+    bench.person.press(POUR_SECOND)
     bench.second.newest = frame(1)
     bench.panel.draw(Now(bench.first.now))
     bench.panel.close()
     bench.panel.show(Now(bench.first.now))
     assert bench.second.told[-1] == "close"
     assert nodes(bench.server) == set()
-    assert bench.panel._text.content == NONE
+    assert bench.person.html == NONE
     bench.panel.close()
 
 
@@ -178,34 +193,33 @@ def test_a_solver_that_died_says_so_without_markup():
 
 def test_a_measured_pile_stands_on_the_other_side_with_names_above_all_three(bench):
     surface = surface_of_revolution(np.array([0.01, 0.03]), np.array([0.02, 0.0]))
-    bench.panel._beside.pour(SCENE, 4, ("calibrated model", "corrected model"))
-    bench.panel._beside.show_measured(surface, "measured\n18.0°", SCENE)
-    made = bench.server.scene._handle_from_node_name
-    assert made["/measured"].position[0] == -BESIDE
-    names = {sign.text.split("\n")[0]: sign.position[0] for name, sign in made.items() if name.startswith("/names/")}
+    bench.beside.pour(SCENE, 4, ("calibrated model", "corrected model"))
+    bench.beside.show_measured(surface, "measured\n18.0°", SCENE)
+    assert drawn(bench.server)["/measured"].position[0] == -BESIDE
+    names = {text.split("\n")[0]: place for text, place in signs(bench.server).items()}
     assert names == {"measured": -BESIDE, "calibrated model": 0.0, "corrected model": BESIDE}
     bench.panel.close()
-    assert not [name for name in made if name.startswith(("/measured", "/names/"))]
+    assert not signs(bench.server)
+    assert not drawn(bench.server, "/measured")
 
 
 def test_each_name_says_what_its_pour_has_come_to(bench):
-    bench.panel._beside.pour_present()
+    bench.person.press(POUR_SECOND)
     rest = {"angle_of_repose_deg": Value(24.0, "deg", 3.0)}
     ended = replace(bench.first.now, state=SessionState.ENDED, outcome=Outcome.AT_REST, observables=rest)
     bench.second.now = replace(bench.second.now, time=0.52)
 
-    def signs():
-        made = bench.server.scene._handle_from_node_name
-        return [sign.text.replace("\n", ": ") for name, sign in made.items() if name.startswith("/names/")]
+    def said():
+        return [text.replace("\n", ": ") for text in signs(bench.server)]
 
     bench.panel.show(Now(ended))
-    assert signs() == ["first pour: 24.0°, one pour", "second pour: pouring, 0.5 s"]
+    assert said() == ["first pour: 24.0°, one pour", "second pour: pouring, 0.5 s"]
     bench.second.now = replace(ended, outcome=Outcome.JAMMED)
     bench.panel.show(Now(ended))
-    assert signs()[1] == "second pour: jammed"
+    assert said()[1] == "second pour: jammed"
     bench.second.now = replace(ended, observables={})
     bench.panel.show(Now(replace(bench.first.now, state=SessionState.DIED)))
-    assert signs() == ["first pour: solver gone", "second pour: at rest, no angle"]
+    assert said() == ["first pour: solver gone", "second pour: at rest, no angle"]
 
 
 class Camera:
@@ -251,7 +265,7 @@ def test_every_camera_looks_at_the_middle_from_where_all_plates_are_in_the_pictu
 def test_a_picture_of_another_shape_holds_all_plates_again_unless_a_person_moved_the_camera(bench, monkeypatch):
     client = SimpleNamespace(camera=Camera(), atomic=nullcontext)
     monkeypatch.setattr(bench.server, "get_clients", lambda: {3: client})
-    bench.panel._beside.pour_present()
+    bench.person.press(POUR_SECOND)
     narrow = np.linalg.norm(client.camera.position - client.camera.look_at)
     client.camera.image_width *= 2  # a panel was folded away
     bench.panel.draw(Now(bench.first.now))
@@ -266,16 +280,16 @@ def test_a_picture_of_another_shape_holds_all_plates_again_unless_a_person_moved
 
 def test_a_plate_does_not_grow_over_the_one_beside_it(bench):
     """A body has rolled 0.9 m away: alone its plate follows it, beside another one it does not."""
-    beside = bench.panel._beside
+    beside = bench.beside
     assert beside.widest_plate == float("inf")
-    bench.panel._beside.pour_present()
+    bench.person.press(POUR_SECOND)
     assert beside.widest_plate == PLATE_RADIUS
     far = replace(frame(1), position=np.float32([[0.9, 0.0, 0.0]]))
     bench.second.newest = far
     bench.panel.draw(Now(bench.first.now))
-    assert beside._nodes._plate._radius == PLATE_RADIUS
+    assert drawn_radius(bench.server, ROOT) == pytest.approx(PLATE_RADIUS)
     alone = SceneNodes(bench.server, SCENE, "/alone")
     alone.show(far)
-    assert alone._plate._radius > 0.9
+    assert drawn_radius(bench.server, "/alone") > 0.9
     beside.close()
     assert beside.widest_plate == float("inf")

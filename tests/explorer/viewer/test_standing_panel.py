@@ -1,6 +1,5 @@
 """A slider that does nothing to a standing pile says so; the former pile stays as a ghost until it is dismissed."""
 
-import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -15,27 +14,32 @@ from explorer.viewer.pour.standing_panel import WATCHED, StandingPanel, shifts, 
 from solver import Outcome, with_values
 from solver.observables import Value
 from tests.explorer.viewer.page_session import PageSession, frame_of, page_context
+from tests.explorer.viewer.person import Person, drawn
 
 SOURCE = material_source("sunflower_extract")
 FRICTION = "pair.seed.seed.static_friction"
 RESTITUTION = "pair.seed.seed.restitution"
 PLACES = np.array([[0.0, 0.0, 0.01], [0.0, 0.02, 0.01], [9.0, 0.0, -9.0]])
 INSIDE = [True, True, False]
+DISMISS = "Dismiss the ghost"
 
 
 @pytest.fixture
 def table(server):
-    """The panel, and a session whose pile has come to rest."""
+    """The panel with a person at it, and a session whose pile has come to rest."""
     session = PageSession(SOURCE)
     angle = {"angle_of_repose_deg": Value(21.7, "deg", 2.0)}
     ended = {"state": SessionState.ENDED, "outcome": Outcome.AT_REST, "time": 3.0}
     session.now = replace(session.now, **ended, observables=angle)
     session.newest = frame_of([0, 1, 0], PLACES, INSIDE)
-    panel = StandingPanel(page_context(server, session))
+    page = page_context(server, session)
+    with server.gui.add_folder("standing") as place:
+        panel = StandingPanel(page)
+    person = Person(place)
 
     def look():
         panel.show(Now(session.now, session.newest))
-        return re.sub(r"<[^>]*>", "", panel._box.content).strip()
+        return person.text
 
     def pass_time(seconds, moved=0.0):
         places = PLACES + np.array([[moved, 0.0, 0.0], [0.0, 0.0, 0.0], [5.0, 0.0, 0.0]])
@@ -44,11 +48,14 @@ def table(server):
         return look()
 
     assert look() == ""
-    return SimpleNamespace(panel=panel, session=session, look=look, pass_time=pass_time, server=server)
+    yield SimpleNamespace(
+        panel=panel, person=person, ghost=page.ghost, session=session, look=look, pass_time=pass_time, server=server
+    )
+    panel.close()
 
 
 def ghosts(server):
-    return [name for name in server.scene._handle_from_node_name if name.startswith(f"{ROOT}/bodies/")]
+    return drawn(server, f"{ROOT}/bodies/")
 
 
 def test_a_change_that_moves_nothing_says_that_the_pile_stands(table):
@@ -88,31 +95,32 @@ def test_what_happened_last_stands_there_and_makes_room_for_what_a_change_did(ta
     evil = "<img src=x onerror=alert(1)>"
     happened = Event(table.session.now.generation, 3.0, f"{evil} at rest")
     table.panel.show(Now(table.session.now, table.session.newest, [happened], f"{evil} refused"))
-    assert "<img" not in table.panel._box.content
-    assert table.panel._box.content.count("&lt;img") == 2
+    assert "<img" not in table.person.html
+    assert table.person.html.count("&lt;img") == 2
     table.session.set_parameters({FRICTION: 0.39})
     table.pass_time(WATCHED)
     table.panel.show(Now(table.session.now, table.session.newest, table.session.events, "refused"))
-    said = re.sub(r"<[^>]*>", "\n", table.panel._box.content)
-    assert "refused" in said
-    assert said.count("0.57 → 0.39") == 1
+    assert "refused" in table.person.text
+    assert table.person.text.count("0.57 → 0.39") == 1
 
 
 def test_poured_again_the_former_pile_stays_as_a_ghost_until_it_is_dismissed(table):
     table.session.set_parameters({FRICTION: 0.39})
     table.pass_time(WATCHED, moved=1e-4)
+    assert not table.person.sees(DISMISS)
     table.session.restart()
     said = table.look()
-    assert table.panel._ghost.former.angle == 21.7
+    assert table.ghost.former.angle == 21.7
     assert "Grey: the former pile; since then static friction seed–seed 0.57 → 0.39" in said
-    node = table.server.scene._handle_from_node_name[f"{ROOT}/bodies/1"]
+    node = ghosts(table.server)[f"{ROOT}/bodies/1"]
     assert node.batched_positions[0] == pytest.approx(PLACES[1])
     assert 0.0 < node.opacity < 0.5
     table.session.restart(with_values(table.session.now.scene, {FRICTION: 0.5}))
     assert table.look() != ""
-    table.panel._ghost.take_away()
-    assert ghosts(table.server) == []
+    table.person.press(DISMISS)
+    assert not ghosts(table.server)
     assert table.look() == ""
+    assert not table.person.sees(DISMISS)
 
 
 def test_a_change_of_the_new_pile_is_told_beside_the_ghost(table):
@@ -133,9 +141,10 @@ def test_a_ghost_goes_with_its_set_up(table):
     table.pass_time(WATCHED)
     table.session.restart()
     assert table.look() != ""
+    assert ghosts(table.server)
     table.session.restart(with_values(table.session.now.scene, {"rig.mass": "20g"}))
     assert table.look() == ""
-    assert ghosts(table.server) == []
+    assert not ghosts(table.server)
 
 
 def test_the_shift_is_that_of_the_bodies_in_the_domain():
