@@ -12,8 +12,8 @@ import pytest
 from explorer.live.messages import SessionState, Status
 from explorer.scene.file import load_scene
 from explorer.scene.meshes import body_triangles, outlet_height, scene_height
-from explorer.units import InputError
 from explorer.viewer.actions import Actions
+from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.look.camera import (
     BODY_REACH,
     DIRECTIONS,
@@ -32,6 +32,7 @@ from explorer.viewer.panel import Now
 from explorer.viewer.view import VIEW_FIELD
 from tests.explorer.beads import RADIUS, bead_scene
 from tests.explorer.viewer.page_session import frame_of, page_context
+from tests.explorer.viewer.person import Person
 from tests.explorer.viewer.test_look import DETAILS, FRAME
 
 SCENE = bead_scene()
@@ -184,114 +185,140 @@ class FakeSession:
         return Status(SessionState.RUNNING, "", SCENE, seed=1, generation=1, speed=1.0)
 
 
+class Tab:
+    """The tab "Look" on a page of its own, and a person at it; ``browser``: the one in which that person sits."""
+
+    def __init__(self):
+        self.server, self.session, actions = guarded_server("127.0.0.1", 0, "test"), FakeSession(), Actions()
+        self.panel, self.browser = LookPanel(page_context(self.server, self.session, actions.post)), FakeClient()
+        self.person = Person(self.server, actions.carry_out, self.browser)
+        self.draw()
+
+    def draw(self, frame=BEADS, **changes):
+        self.panel.draw(Now(self.session.status(), replace(frame, **changes)))
+
+    def click(self, x, y):
+        self.panel.click(np.array([x, y, 1.0]), DOWN)
+        self.draw()
+
+    def cut(self, at):
+        """Cut away what is above ``at`` [mm]."""
+        self.person.enter("Cut away", "z above")
+        self.person.enter("Place of the cut [mm]", at)
+
+    @property
+    def bodies(self):
+        return self.server.scene.get_handle_by_name("/bodies/0")
+
+    @property
+    def shows_chains(self):
+        lines = map(self.server.scene.get_handle_by_name, ("/forces/core", "/forces/rim"))
+        return any(line is not None and line.visible for line in lines)
+
+
 @pytest.fixture
-def tab(server):
-    session, actions = FakeSession(), Actions()
-    tab = LookPanel(page_context(server, session, actions.post))
-    tab.draw(Now(session.status(), BEADS))
-    yield SimpleNamespace(tab=tab, session=session, actions=actions, nodes=tab._nodes)
-    tab._nodes.remove()
-
-
-def click(tab, x, y):
-    tab.tab.click(np.array([x, y, 1.0]), DOWN)
-    tab.tab.draw(Now(tab.session.status(), BEADS))
+def tab():
+    tab = Tab()
+    yield tab
+    tab.server.stop()
 
 
 def test_a_click_inspects_a_body_and_another_beside_lets_it_go(tab):
     assert tab.session.watched == (False, None)
-    click(tab, 0.05, 0.0)
+    tab.click(0.05, 0.0)
     assert tab.session.watched == (True, 1)
-    assert tab.nodes.bodies.nodes[0].batched_colors[1].tolist() == list(linear(SELECTED))
-    assert "bead no. 2 of 4" in tab.tab._text.content
-    click(tab, 0.5, 0.5)
+    assert tab.bodies.batched_colors[1].tolist() == list(linear(SELECTED))
+    assert "bead no. 2 of 4" in tab.person.text
+    assert NOBODY not in tab.person.text
+    tab.click(0.5, 0.5)
     assert tab.session.watched == (False, None)
-    assert NOBODY in tab.tab._text.content
-    assert tab.nodes.bodies.nodes[0].batched_colors[1].tolist() != list(linear(SELECTED))
+    assert NOBODY in tab.person.text
+    assert tab.bodies.batched_colors[1].tolist() != list(linear(SELECTED))
 
 
 def test_a_body_that_is_cut_away_cannot_be_clicked(tab):
-    tab.tab._settings.change(cut_away="z above", cut_at=0.07)
-    click(tab, 0.0, 0.0)
+    tab.cut(at=70.0)
+    tab.click(0.0, 0.0)
     assert tab.session.watched == (True, 2)
-    assert tab.nodes.bodies.nodes[0].batched_scales.tolist()[:4] == [0, 0, 1, 0]
+    assert tab.bodies.batched_scales.tolist()[:4] == [0, 0, 1, 0]
 
 
 def test_keys_go_from_body_to_body_among_those_in_sight(tab):
-    def step(by):
-        tab.tab._step(by)
-        tab.tab.draw(Now(tab.session.status(), BEADS))
+    after, before = "Inspect the next body", "Inspect the body that entered before"
+
+    def step(key):
+        assert tab.person.hit(key) == ""
+        tab.draw()
         return tab.session.watched[1]
 
-    assert step(1) == int(np.argmax(BEADS.position[:, 2]))  # at first the topmost
+    assert step(after) == int(np.argmax(BEADS.position[:, 2]))  # at first the topmost
     seen = np.flatnonzero(BEADS.inside).tolist()
     assert 1 < len(seen) < len(BEADS.component)
-    tab.tab._release()
-    click(tab, 0.05, 0.0)  # no. 2, counted from 1
+    tab.person.hit("Let the body go")
+    tab.click(0.05, 0.0)  # no. 2, counted from 1
     place = seen.index(1)
-    assert [step(1) for _ in seen] == [*seen[place + 1 :], *seen[: place + 1]]
-    assert step(-1) == seen[place - 1]
-    tab.tab._settings.change(cut_away="z above", cut_at=-1.0)
-    with pytest.raises(InputError, match="no body is in sight"):
-        tab.tab._step(1)
+    assert [step(after) for _ in seen] == [*seen[place + 1 :], *seen[: place + 1]]
+    assert step(before) == seen[place - 1]
+    tab.cut(at=-200.0)
+    assert tab.person.hit(after) == "no body is in sight"
 
 
 def test_a_camera_follows_until_the_body_is_let_go(tab, monkeypatch):
-    one, other = FakeClient(1), FakeClient(2)
-    monkeypatch.setattr(tab.tab._server, "get_clients", lambda: {1: one, 2: other})
-    with pytest.raises(InputError, match="click a body"):
-        tab.tab._follow(one)
-    click(tab, 0.05, 0.0)
-    tab.tab._follow(one)
+    one, other = tab.browser, FakeClient(2)
+    monkeypatch.setattr(tab.server, "get_clients", lambda: {1: one, 2: other})
+    assert "click a body" in tab.person.press("Follow")
+    tab.click(0.05, 0.0)
+    assert tab.person.press("Follow") == ""
     assert one.camera.look_at == pytest.approx(BEADS.position[1])
-    moved = replace(BEADS, number=2, position=BEADS.position + np.float32([0, 0.01, 0]))
-    tab.tab.draw(Now(tab.session.status(), moved))
-    assert one.camera.look_at == pytest.approx(moved.position[1])
+    moved = BEADS.position + np.float32([0, 0.01, 0])
+    tab.draw(number=2, position=moved)
+    assert one.camera.look_at == pytest.approx(moved[1])
     assert other.groups == 0
-    tab.tab._release()
-    tab.tab.draw(Now(tab.session.status(), replace(BEADS, number=3)))
-    assert one.camera.look_at == pytest.approx(moved.position[1])
+    tab.person.press("Release")
+    tab.draw(number=3)
+    assert one.camera.look_at == pytest.approx(moved[1])
 
 
 def test_a_follower_that_has_gone_is_forgotten(tab, monkeypatch):
-    client = FakeClient(1)
-    monkeypatch.setattr(tab.tab._server, "get_clients", lambda: {1: client})
-    click(tab, 0.05, 0.0)
-    tab.tab._follow(client)
-    monkeypatch.setattr(tab.tab._server, "get_clients", dict)
-    tab.tab.draw(Now(tab.session.status(), replace(BEADS, number=2)))
-    assert tab.tab._followers == set()
+    monkeypatch.setattr(tab.server, "get_clients", lambda: {1: tab.browser})
+    tab.click(0.05, 0.0)
+    tab.person.press("Follow")
+    monkeypatch.setattr(tab.server, "get_clients", dict)
+    tab.draw(number=2)
+    monkeypatch.setattr(tab.server, "get_clients", lambda: {1: tab.browser})
+    tab.draw(number=3, position=BEADS.position + np.float32([0, 0.01, 0]))
+    assert tab.browser.camera.look_at == pytest.approx(BEADS.position[1])
 
 
 def test_another_pour_or_a_time_before_its_entry_lets_a_body_go(tab):
-    click(tab, 0.05, 0.0)
-    tab.tab.draw(Now(tab.session.status(), replace(BEADS, number=2, generation=2)))
+    tab.click(0.05, 0.0)
+    tab.draw(number=2, generation=2)
     assert tab.session.watched == (False, None)
-    click(tab, 0.05, 0.0)
-    click(tab, 0.05, 0.0)
+    tab.click(0.05, 0.0)
+    tab.click(0.05, 0.0)
     assert tab.session.watched == (True, 1)
-    early = replace(
-        BEADS, number=3, component=BEADS.component[:1], position=BEADS.position[:1], inside=BEADS.inside[:1]
-    )
-    tab.tab.draw(Now(tab.session.status(), replace(early, quaternion=BEADS.quaternion[:1], scale=BEADS.scale[:1])))
+    early = {name: getattr(BEADS, name)[:1] for name in ("component", "position", "inside", "quaternion", "scale")}
+    tab.draw(number=3, **early)
     assert tab.session.watched == (False, None)
 
 
 def test_what_is_asked_for_is_drawn_when_it_comes(tab):
-    tab.tab._settings.change(colour_by="speed", chains=True)
-    tab.tab.draw(Now(tab.session.status(), BEADS))
+    tab.person.enter("Colour by", "speed")
+    tab.person.enter("Force chains", True)
+    tab.draw()
     assert tab.session.watched == (True, None)
-    assert not any(node.visible for node in tab.tab._chains._tubes._nodes)
-    before = tab.nodes.bodies.nodes[0].batched_colors.copy()
+    assert not tab.shows_chains
+    before = tab.bodies.batched_colors.copy()
     tab.session.found = DETAILS
-    tab.tab.draw(Now(tab.session.status(), BEADS))
-    assert any(node.visible for node in tab.tab._chains._tubes._nodes)
-    assert (tab.nodes.bodies.nodes[0].batched_colors != before).any()
-    assert tab.nodes.bodies.nodes[0].opacity < 1.0
-    tab.tab._settings.change(colour_by="component", chains=False)
-    tab.tab.draw(Now(tab.session.status(), BEADS))
-    assert not any(node.visible for node in tab.tab._chains._tubes._nodes)
-    assert tab.nodes.bodies.nodes[0].opacity is None
+    tab.draw()
+    assert tab.shows_chains
+    assert (tab.bodies.batched_colors != before).any()
+    assert tab.bodies.opacity < 1.0
+    tab.person.enter("Colour by", "component")
+    tab.person.enter("Force chains", False)
+    tab.draw()
+    assert not tab.shows_chains
+    assert tab.bodies.opacity is None
 
 
 @pytest.mark.parametrize("direction", [(0.62, -0.75, 0.24), (0.0, -1.0, 0.0), (0.0, 0.0, 3.0), (1.0, 0.0, -0.2)])

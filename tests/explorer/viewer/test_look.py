@@ -49,6 +49,7 @@ from explorer.viewer.palette import (
 from explorer.viewer.scene_nodes import SceneNodes, tube_places
 from solver.scenes.insertion import rotation_matrix
 from tests.explorer.beads import bead_scene
+from tests.explorer.viewer.person import Person
 
 FRAME = Frame(
     number=1,
@@ -81,18 +82,15 @@ DETAILS = Details(
 
 @pytest.fixture
 def panel(server):
+    """The controls in a place of their own, and a person at them."""
     actions = Actions()
     settings = LookSettings(actions.post)
-    colours = ColourPanel(server, server.gui.add_html(""), settings, QUANTITIES, actions.post)
-    forces, cut = ForcePanel(server, settings, actions.post), CutPanel(server, settings, actions.post)
-    handles = {**vars(colours), **vars(forces), **vars(cut)}
-    return SimpleNamespace(settings=settings, colours=colours, handles=handles, actions=actions)
-
-
-def enter(handle, value, client_id=0):
-    """What viser hands to a callback when a browser has sent ``value``."""
-    for callback in handle._impl.update_cb:
-        callback(SimpleNamespace(client_id=client_id, target=SimpleNamespace(value=value)))
+    with server.gui.add_folder("Look") as place:
+        colours = ColourPanel(server, server.gui.add_html(""), settings, QUANTITIES, actions.post)
+        ForcePanel(server, settings, actions.post)
+        CutPanel(server, settings, actions.post)
+    person = Person(place, actions.carry_out)
+    return SimpleNamespace(settings=settings, colours=colours, person=person, actions=actions)
 
 
 def test_quantities_are_what_their_names_say():
@@ -264,18 +262,24 @@ def test_a_tube_lies_along_its_segment_whichever_way_that_points():
 
 
 def test_chains_are_hidden_and_their_room_grows(server):
-    chains, tubes = ForceChains(server), np.zeros((40, 2, 3))
-    tubes[:, 1, 0] = 1.0
+    def drawn():
+        return [server.scene.get_handle_by_name(f"/forces/{part}") for part in ("core", "rim")]
+
+    chains = ForceChains(server)
     chains.show(FRAME, FRAME.inside, DETAILS, 1.0)
-    core, rim = chains._tubes._nodes
+    core, rim = drawn()
     assert (core.batched_scales[:, 0] > 0).sum() == 3
     assert (rim.batched_scales[:3, 0] > core.batched_scales[:3, 0]).all()
-    assert (core._impl.props.side, rim._impl.props.side) == ("front", "back")
+    assert (core.side, rim.side) == ("front", "back")
+    assert core.visible
+    assert rim.visible
     chains.hide()
     assert not core.visible
     assert not rim.visible
-    chains._tubes.show(tubes, np.ones(40))
-    assert (chains._tubes._nodes[0].batched_scales[:, 2] == 1).sum() == 40
+    contacts = ("body", "partner", "point", "normal_force", "tangential_force")
+    many = replace(DETAILS, **{name: np.repeat(getattr(DETAILS, name), 14, axis=0) for name in contacts})
+    chains.show(FRAME, FRAME.inside, many, 1.0)
+    assert [(node.batched_scales[:, 2] > 0).sum() for node in drawn()] == [42, 42]
 
 
 def test_a_cut_hides_one_side_and_nothing_else():
@@ -305,79 +309,94 @@ def test_nodes_are_painted_faded_and_hidden(server):
     nodes.bodies.fade(0.3)
     nodes.fade(0.7)
     assert node.opacity == 0.3
-    assert nodes._rig["cone"].opacity == 0.7
-    assert nodes._rig["plate"].opacity is None
-    assert nodes._rig["gate"].opacity == 0.5
+    opacity = {name: server.scene.get_handle_by_name(f"/rig/{name}").opacity for name in ("cone", "plate", "gate")}
+    assert opacity == {"cone": 0.7, "plate": None, "gate": 0.5}
     nodes.remove()
 
 
 def test_controls_make_a_look(panel):
-    handles, actions = panel.handles, panel.actions
-    enter(handles["_colour"], "speed")
-    enter(handles["_chains"], True)
-    enter(handles["_threshold"], 99.0)
-    enter(handles["_cut"], "y below")
-    enter(handles["_cut_at"], -20.0)
-    enter(handles["_opacity"], 0.5)
-    enter(handles["_shadows"], False)
-    assert actions.carry_out() == ""
+    entered = {
+        "Colour by": "speed",
+        "Force chains": True,
+        "From × mean force": 2.0,
+        "Cut away": "y below",
+        "Place of the cut [mm]": -20.0,
+        "Opacity of the rig": 0.5,
+        "Shadows": False,
+    }
+    for label, value in entered.items():
+        assert panel.person.enter(label, value) == ""
     assert panel.settings.look == Look(
-        colour_by="speed", chains=True, threshold=5.0, cut_away="y below", cut_at=-0.02, rig_opacity=0.5, shadows=False
+        colour_by="speed", chains=True, threshold=2.0, cut_away="y below", cut_at=-0.02, rig_opacity=0.5, shadows=False
     )
+    assert panel.person.send("From × mean force", 99.0) == ""
+    assert panel.settings.look.threshold == 5.0
 
 
 @pytest.mark.parametrize(
-    ("control", "value"),
+    ("label", "value"),
     [
-        ("_colour", "<script>"),
-        ("_colour", ["speed"]),
-        ("_cut", 3),
-        ("_cut_at", math.nan),
-        ("_threshold", "much"),
-        ("_opacity", None),
-        ("_low", math.inf),
+        ("Colour by", "<script>"),
+        ("Colour by", ["speed"]),
+        ("Cut away", 3),
+        ("Place of the cut [mm]", math.nan),
+        ("From × mean force", "much"),
+        ("Opacity of the rig", None),
+        ("From", math.inf),
     ],
 )
-def test_what_a_browser_may_not_send_is_refused_in_a_line(panel, control, value):
+def test_what_a_browser_may_not_send_is_refused_in_a_line(panel, label, value):
     before = panel.settings.look
-    enter(panel.handles[control], value)
-    assert panel.actions.carry_out()
+    assert panel.person.send(label, value)
     assert panel.settings.look == before
 
 
 def test_what_the_page_writes_itself_is_no_input(panel):
-    enter(panel.handles["_colour"], "speed", client_id=None)
+    panel.person.control("Colour by").value = "speed"
     assert panel.actions.carry_out() is None
+    assert panel.settings.look == Look()
 
 
 def test_an_entered_end_fixes_the_range_at_what_is_on_the_screen(panel):
-    settings, handles = panel.settings, panel.handles
-    settings.change(colour_by="speed")
+    settings, person = panel.settings, panel.person
+
+    def fixed():
+        return settings.look.automatic, settings.look.low, settings.look.high
+
+    person.enter("Colour by", "speed")
     panel.colours.show(DETAILS)
-    assert (handles["_low"].value, handles["_high"].value) == (0.51, 0.99)
-    enter(handles["_low"], 0.25)
-    panel.actions.carry_out()
-    assert (settings.look.automatic, settings.look.low, settings.look.high) == (False, 0.25, 0.99)
-    assert handles["_automatic"].value is False
-    enter(handles["_low"], 3.0)
-    assert "not above" in panel.actions.carry_out()
+    assert (person.value("From"), person.value("To")) == (0.51, 0.99)
+    assert person.control("From").disabled
+    person.send("From", 0.25)  # by somebody who does not know that yet
+    assert fixed() == (False, 0.25, 0.99)
+    assert person.value("Automatic range") is False
+    person.enter("Automatic range", True)
+    panel.colours.show(DETAILS)
+    person.enter("Automatic range", False)
+    assert fixed() == (False, 0.51, 0.99)
+    panel.colours.show(DETAILS)
+    person.enter("From", 0.25)
+    assert fixed() == (False, 0.25, 0.99)
+    assert "not above" in person.enter("From", 3.0)
     with pytest.raises(InputError, match="colour range"):
         settings.change(low=1.0, high=1.0)
 
 
 def test_a_range_is_reset(panel):
-    panel.settings.change(automatic=False, logarithmic=True, low=0.5, high=2.0)
-    enter(panel.handles["_reset"], True)
-    panel.actions.carry_out()
+    for label, value in {"Automatic range": False, "Logarithmic": True, "From": 0.5, "To": 2.0}.items():
+        assert panel.person.enter(label, value) == ""
+    assert panel.settings.look == Look(automatic=False, logarithmic=True, low=0.5, high=2.0)
+    panel.person.press("Reset the range")
     assert panel.settings.look == Look(low=0.5, high=2.0)
-    assert panel.handles["_logarithmic"].value is False
+    assert panel.person.value("Logarithmic") is False
+    assert panel.person.value("Automatic range") is True
 
 
 def test_keys_walk_through_the_choices(panel):
     settings, choices = panel.settings, (COMPONENT, *QUANTITIES)
     for _ in choices[1:]:
         settings.next("colour_by", choices)
-    assert (settings.look.colour_by, panel.handles["_colour"].value) == (choices[-1], choices[-1])
+    assert (settings.look.colour_by, panel.person.value("Colour by")) == (choices[-1], choices[-1])
     settings.next("colour_by", choices)
     assert settings.look.colour_by == COMPONENT
     assert settings.look.cut_away == NOTHING

@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from viser._messages import GuiUpdateMessage
 
 from explorer.background.command_process import CommandStatus
 from explorer.live.messages import Event, SessionState, Status
@@ -45,13 +46,14 @@ def test_a_study_is_told_once_per_state_and_ends_by_itself(state, asked):
 
 def people(browsers):
     """With so many browsers, the second of which has just moved a control."""
+    handlers = {}
     server = SimpleNamespace(
         get_clients=lambda: dict.fromkeys(range(browsers)),
         on_client_connect=lambda act: act,
-        _websock_server=SimpleNamespace(register_handler=lambda kind, act: None),
+        _websock_server=SimpleNamespace(register_handler=handlers.__setitem__),
     )
     made = People(server)
-    made._acted(1, None)
+    handlers[GuiUpdateMessage](1, None)
     return made
 
 

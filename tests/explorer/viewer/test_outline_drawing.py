@@ -1,13 +1,12 @@
 """The pile from the side: what is drawn in the panel and in 3-D, and measured data over it."""
 
 import re
-import time
+import threading
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from viser import UploadedFile
 
 from doe.measurement.load import load_measurement
 from explorer.errors import CommandError
@@ -27,7 +26,8 @@ from explorer.viewer.pour.outline_panel import NONE, OWN, OutlinePanel
 from solver.assets import measurement_folder
 from solver.observables.reading import PileReading
 from tests.explorer.files.test_uploads import archive, drum_files
-from tests.explorer.viewer.page_session import event, finished, page_context
+from tests.explorer.viewer.page_session import finished, page_context
+from tests.explorer.viewer.person import Person
 from tests.explorer.viewer.test_texts import STATUS
 from tests.solver.observables.made_up import cone, joined, moved
 
@@ -103,77 +103,82 @@ def test_a_free_surface_is_drawn_about_the_axis_of_its_drum():
     assert surface.z - observed.scene.rig.radius == pytest.approx(observed.offered["surface_profile_m"].values[0])
 
 
+class Bench:
+    """The panel with a person at it."""
+
+    def __init__(self, server, data):
+        actions = Actions()
+        page = page_context(server, post=actions.post, data=data)
+        with server.gui.add_folder("Silhouette") as place:
+            self.panel = OutlinePanel(page)
+        self.person = Person(place, lambda: finished(actions, page.background))
+        self.node = server.scene.get_handle_by_name
+
+    def text(self, outline=FRONT):
+        """What stands there once the panel has looked at a pour with this outline."""
+        self.panel.show(Now(replace(STATUS, outline=outline)))
+        return self.person.text
+
+    @property
+    def lines(self):
+        """Nodes of the lines in 3-D, and of their rims."""
+        return [self.node(f"/fit/{line}/{part}") for line in ("measured", "flanks") for part in ("core", "rim")]
+
+
 @pytest.fixture
 def bench(server, tmp_path):
     return Bench(server, tmp_path)
 
 
-class Bench:
-    def __init__(self, server, data):
-        self.actions = Actions()
-        page = page_context(server, post=self.actions.post, data=data)
-        self.panel, self.background = OutlinePanel(page), page.background
-
-    def sent(self, handle, value):
-        """What came of a browser's input: the line of a refusal, or ""."""
-        event(handle, value)
-        return finished(self.actions, self.background)
-
-
 def test_measured_data_are_laid_over_the_pile_and_taken_off(bench):
-    panel = bench.panel
-    panel.show(Now(replace(STATUS, outline=FRONT)))
-    assert bench.sent(panel._data, "granudrum_mcc") == ""
-    assert panel._curve.options == ("drum_15rpm: free surface", "drum_45rpm: free surface")
-    bench.sent(panel._curve, "drum_45rpm: free surface")
-    panel.show(Now(replace(STATUS, outline=FRONT)))
-    assert "drum_45rpm: free surface" in panel._html.content
-    assert all(node.visible for node in drawn(panel))
-    assert len(drawn(panel)) == 4  # lines and their rims
-    bench.sent(panel._data, NONE)
-    panel.show(Now(replace(STATUS, outline=None)))
-    assert "measured" not in panel._html.content
-    assert not any(node.visible for node in drawn(panel))
-
-
-def drawn(panel):
-    """Nodes of the lines in 3-D."""
-    return [*panel._nodes._measured._nodes, *panel._nodes._flanks._nodes]
+    person = bench.person
+    assert "measured" not in bench.text()
+    assert person.enter("Measured", "granudrum_mcc") == ""
+    assert person.options("Curve") == ("drum_15rpm: free surface", "drum_45rpm: free surface")
+    assert person.enter("Curve", "drum_45rpm: free surface") == ""
+    assert "measured, drum_45rpm: free surface" in bench.text()
+    assert all(node.visible for node in bench.lines)
+    person.enter("Measured", NONE)
+    assert "measured" not in bench.text(outline=None)
+    assert not any(node.visible for node in bench.lines)
 
 
 def test_a_folder_without_data_is_refused_in_one_line_and_changes_nothing(bench, tmp_path):
-    bench.panel._folder.value = str(tmp_path)
-    notice = bench.sent(bench.panel._data, OWN)
-    assert "measurement.toml" in notice
-    assert "\n" not in notice
-    assert bench.panel._measured is None
+    person = bench.person
+    person.enter("Measured", "granudrum_mcc")
+    for label, value in (("Folder", str(tmp_path)), ("Measured", OWN)):
+        notice = person.enter(label, value)
+        assert "measurement.toml" in notice
+        assert "\n" not in notice
+        assert "measured, drum_15rpm: free surface" in bench.text()
 
 
 def test_uploaded_data_are_laid_over_the_pile_and_a_bad_archive_changes_nothing(bench):
-    panel = bench.panel
-    assert bench.sent(panel._upload, UploadedFile("drum.zip", archive(drum_files()))) == ""
-    assert panel._curve.value == "drum_15rpm: free surface"
-    folder = panel._folder.value
+    person, button = bench.person, "Upload measured data"
+    assert person.upload(button, "drum.zip", archive(drum_files())) == ""
+    assert person.value("Curve") == "drum_15rpm: free surface"
+    folder = person.value("Folder")
     assert load_measurement(Path(folder)).conditions
-    assert "cannot be unpacked" in bench.sent(panel._upload, UploadedFile("drum.zip", b"no archive"))
-    assert (panel._folder.value, panel._measured.name) == (folder, "drum_15rpm: free surface")
+    assert "cannot be unpacked" in person.upload(button, "drum.zip", b"no archive")
+    assert person.value("Folder") == folder
+    assert "measured, drum_15rpm: free surface" in bench.text()
 
 
 def test_a_single_curve_is_drawn_and_a_bad_file_leaves_it(bench):
-    panel = bench.panel
-    assert bench.sent(panel._upload, UploadedFile("photo.csv", b"u_m,z_m\n-0.02,0\n0,0.01\n0.02,0\n")) == ""
-    assert (panel._curve.options, panel._data.value) == (("photo.csv",), NONE)
-    assert "photo.csv: not a text file" in bench.sent(panel._upload, UploadedFile("photo.csv", b"\0"))
-    panel.show(Now(replace(STATUS, outline=FRONT)))
-    assert "measured, photo.csv" in panel._html.content
+    person, button = bench.person, "Upload measured data"
+    assert person.upload(button, "photo.csv", b"u_m,z_m\n-0.02,0\n0,0.01\n0.02,0\n") == ""
+    assert (person.options("Curve"), person.value("Measured")) == (("photo.csv",), NONE)
+    assert "photo.csv: not a text file" in person.upload(button, "photo.csv", b"\0")
+    assert "measured, photo.csv" in bench.text()
 
 
 def test_one_thing_is_done_at_a_time_and_a_mistake_is_no_refusal():
-    actions, done = Actions(), []
+    actions, done, told = Actions(), [], threading.Event()
     background = BackgroundWork(actions.post)
-    background.start("waiting", lambda: time.sleep(0.2) or 7, done.append)
+    background.start("waiting", lambda: told.wait(60.0) and 7, done.append)
     with pytest.raises(CommandError, match="another: wait until this is done: waiting"):
         background.start("another", lambda: 1, done.append)
+    told.set()
     assert finished(actions, background) == ""
     assert done == [7]
     background.start("another", lambda: 1 / 0, done.append)

@@ -1,8 +1,10 @@
 """The page as a whole below the browser: one loop, all panels, another scene, a real recording."""
 
+import json
 import threading
-import time
 from dataclasses import replace
+from types import SimpleNamespace
+from urllib.parse import urlencode
 
 import pytest
 
@@ -10,24 +12,30 @@ from explorer.diagnosis.process import DiagnoseProcess
 from explorer.live.messages import Event, SessionState, Status
 from explorer.logs.recording_reader import read_recording
 from explorer.project.project import study_project
-from explorer.scene.source import material_source, rig_source
+from explorer.scene.source import material_source
 from explorer.viewer.app import serve
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.panel import LOOK, SELDOM, Panel, Tab
 from explorer.viewer.panels import PANELS
+from explorer.viewer.shell.channel import ShellChannel
 from solver.scenes.scene import value
 from tests.explorer.background.waiting import wait_for
 from tests.explorer.viewer.page_session import PageSession, frame_of, page_of
+from tests.explorer.viewer.person import Person
 
 SOURCE = material_source("sunflower_extract")
 FRICTION = "pair.seed.seed.static_friction"
 
 
 class Session(PageSession):
-    """With the rest of what the page's loop asks."""
+    """With the rest of what the page's loop asks; ``turns``: how often it has gone round."""
+
+    turns = 0
 
     def new_events(self):
-        events, self.events = tuple(self.events), []
+        self.turns += 1
+        events = tuple(self.events)
+        del self.events[: len(events)]  # what a test has put there meanwhile stays
         return events
 
     def step(self):
@@ -53,14 +61,21 @@ class ClosableSession(Session):
 
 @pytest.fixture
 def running(tmp_path, monkeypatch):
-    """A page whose loop runs in a thread, and its session."""
+    """A page whose loop runs in a thread, the session behind it, and a person at it."""
     monkeypatch.setattr("explorer.viewer.page.data_folder", lambda: tmp_path)
-    server, session, stop = guarded_server("127.0.0.1", 0, "test"), Session(SOURCE), threading.Event()
+    channel, server = ShellChannel(), guarded_server("127.0.0.1", 0, "test")
+    session, stop = Session(SOURCE), threading.Event()
     diagnosis = DiagnoseProcess(tmp_path / "diagnoses", tmp_path / "runs.sqlite")
-    page = page_of(server, session, diagnosis, tmp_path)
+    page = page_of(server, session, diagnosis, tmp_path, channel)
     loop = threading.Thread(target=page.run, args=(stop,))
     loop.start()
-    yield page, session
+
+    def ask(**command):
+        """As a person does in what stands around the page."""
+        channel.take(json.dumps(command))
+
+    node = server.scene.get_handle_by_name
+    yield SimpleNamespace(person=Person(server), page=page, session=session, node=node, ask=ask)
     stop.set()
     loop.join(10)
     page.close()
@@ -68,41 +83,55 @@ def running(tmp_path, monkeypatch):
     server.stop()
 
 
+def change_friction(person):
+    """0.57 → 0.2 between seeds."""
+    person.enter("Pair", "seed – seed")
+    wait_for(lambda: person.sees("Static friction"))
+    person.enter("Static friction", 0.2)
+
+
+def curves(person):
+    """The chart of angle and mass; its last series are the marks of changes."""
+    (chart,) = (one for one in person.within("Pour").curves if one.series[3]["label"] == "angle [°]")
+    return chart
+
+
 def test_a_change_reaches_list_chart_and_command_line_and_is_undone(running):
-    page, session = running
-    page._actions.post(lambda: session.set_parameters({FRICTION: 0.2}))
-    wait_for(lambda: "0.57 → <b>0.2</b>" in page.panels["changes"]._list.content)
-    wait_for(lambda: page.panels["chart"]._plot.series[-1]["label"].endswith("0.57 → 0.2"))
-    wait_for(lambda: f"{FRICTION}=0.2" in page.panels["output"]._command.content)
-    page._actions.post(page.panels["changes"]._undo)
-    wait_for(lambda: "Everything is at its default" in page.panels["changes"]._list.content)
-    assert value(session.now.scene, FRICTION) == 0.57
+    person, changes = running.person, running.person.within("Changes and presets")
+    change_friction(person)
+    wait_for(lambda: "0.57 → <b>0.2</b>" in changes.html)
+    wait_for(lambda: curves(person).series[-1]["label"].endswith("0.57 → 0.2"))
+    wait_for(lambda: f"{FRICTION}=0.2" in person.within("Export").text)
+    person.press("Undo (Z)")
+    wait_for(lambda: "Everything is at its default" in changes.text)
+    assert value(running.session.now.scene, FRICTION) == 0.57
 
 
 def test_all_panels_follow_another_rig(running):
-    page, session = running
-    drum = rig_source("rotating_drum", "nine_sphere_seed")
-    page._actions.post(lambda: session.start(drum.scene, 3, drum))
-    wait_for(lambda: "--seed 3" in (told := page.panels["output"]._command.content) and "rotating_drum" in told)
-    wait_for(lambda: "rig.speed_rpm" in page.panels["set_up"]._controls._inputs)
-    assert page.panels["scene"]._rig.value == "rotating_drum"
-    assert page.panels["look"]._status.scene == drum.scene
+    person = running.person
+    assert running.node("/rig/shell") is None
+    link = {"pour": "rotating_drum", "material": "nine_sphere_seed", "seed": 3}
+    running.ask(do="pour_link", text=urlencode(link))
+    wait_for(lambda: "--seed 3" in (told := person.within("Export").text) and "rotating_drum" in told)
+    wait_for(lambda: person.within("Set-up").sees("Speed rpm [rpm]"))
+    wait_for(lambda: person.within("Rig and material").value("Rig") == "rotating_drum")
+    wait_for(lambda: running.node("/rig/shell") is not None)
+    assert running.node("/rig/cone") is None
 
 
 def test_a_recording_of_the_page_holds_the_changes(running, tmp_path):
     rerun_chunk = pytest.importorskip("rerun.chunk")
-    page, session = running
-    session.newest = frame_of([0, 1], [[0.0, 0.0, 0.01], [0.0, 0.02, 0.01]])
-    page._actions.post(lambda: page._context.recording.begin("rerun (.rrd)"))
-    wait_for(lambda: page._context.recording.running)
-    time.sleep(0.2)
-    page._actions.post(lambda: session.set_parameters({FRICTION: 0.2}))
-    wait_for(lambda: f"{FRICTION}=0.2" in page.panels["output"]._command.content)
-    time.sleep(0.2)
-    page._actions.post(page._context.recording.end)
-    wait_for(lambda: not page._context.recording.running)
-    path = page._context.recording.path
-    assert path.parent == tmp_path / "recordings"
+    running.session.newest = frame_of([0, 1], [[0.0, 0.0, 0.01], [0.0, 0.02, 0.01]])
+    person, export = running.person, running.person.within("Export")
+    # What the page tells in one of its turns, it has recorded before.
+    export.press("Start")
+    wait_for(lambda: export.options("Record") == ("Stop",))
+    change_friction(person)
+    wait_for(lambda: f"{FRICTION}=0.2" in export.text)
+    export.press("Stop")
+    wait_for(lambda: "Download" in export.options("Record"))
+    (path,) = (tmp_path / "recordings").iterdir()
+    assert str(path) in export.text
     texts = []
     for chunk in rerun_chunk.RrdReader(path).stream():
         batch = chunk.to_record_batch()
@@ -115,14 +144,14 @@ class RestartedPage:
     """Stands in for the page: it hands its recorder two pours, and ends."""
 
     def __init__(self, *others, place):
-        (self._recorder,) = others[-1]
+        (self.recorder,) = others[-1]
 
     def run(self, stop):
         for generation, times in ((1, (1.0,)), (2, (0.0, 0.5))):
             for now in times:
                 status = Status(SessionState.RUNNING, "", SOURCE.scene, 1, generation, 1.0, time=now)
                 frame = frame_of([0], [[0.0, 0.0, 0.01]], generation=generation)
-                self._recorder.take(replace(frame, time=now), status)
+                self.recorder.take(replace(frame, time=now), status)
 
     def close(self):
         pass
@@ -186,31 +215,31 @@ def plugged_in(monkeypatch):
 
 
 def test_a_panel_of_a_plug_in_stands_in_its_tab_and_follows_the_page(plugged_in, running):
-    page, _ = running
-    gui, magnets, poles = page._server.gui, page.panels["magnets"], page.panels["poles"]
-    containers = gui._container_handle_from_uuid.values()
-    groups = {id(one._parent): one._parent._tab_handles for one in containers if hasattr(one, "_parent")}
-    controls, study = groups.values()
-    assert [tab._label for tab in controls] == ["Controls", "Set-up", "Look", "Export"]
-    assert [tab._label for tab in study] == ["Pour", "Calibrate", "Diagnose", "Laboratory", "Reports", "Magnets"]
-    (folder,) = study[-1]._children.values()
-    assert (folder.label, list(folder._children.values())) == ("Pull", [magnets.text])
-    assert list(controls[2]._children.values())[-1] is poles.text
+    person, page = running.person, running.page
+    magnets, poles = page.panels["magnets"], page.panels["poles"]
+    controls, study = person.tabs
+    assert controls == ["Controls", "Set-up", "Look", "Export"]
+    assert study == ["Pour", "Calibrate", "Diagnose", "Laboratory", "Reports", "Magnets"]
     assert "absent" not in page.panels
-    page._actions.post(lambda: float("strong"))
+    running.ask(do="pour_link", text="pour=strong")
+    told = "funnel: link: 'strong' is neither a shipped scene nor the one that this page began with"
+    wait_for(lambda: person.within("Magnets").within("Pull").text == told)
+    wait_for(lambda: person.within("Look").text.endswith(told))
+    with pytest.raises(AssertionError, match="nothing is called ''"):
+        person.within("Look").within(poles.title)  # no folder of its own
     for panel in (magnets, poles):
-        wait_for(lambda panel=panel: panel.text.content == "funnel: could not convert string to float: 'strong'")
         wait_for(lambda panel=panel: panel.drawn > 3)
-    page._actions.post(lambda: page._switch_theme())
+    running.ask(do="theme")
     wait_for(lambda: not magnets.dark)
     page.close()
     assert magnets.closed
 
 
 def test_an_event_that_is_no_change_is_no_mark(running):
-    page, session = running
-    session.events.append(Event(1, 0.4, "refused: nothing"))
+    """Of two events the one that is a change is marked, and the other is not."""
+    person, session = running.person, running.session
     session.now = replace(session.now, time=0.5)
-    wait_for(lambda: len(page._events) == 1)
-    time.sleep(0.3)
-    assert page.panels["chart"]._plot.data[-1].sum() == 0
+    session.events += [Event(1, 0.4, "refused: nothing"), Event(1, 0.45, "friction", is_change=True)]
+    wait_for(lambda: curves(person).data[-1].any())
+    moments, *_, marks = curves(person).data
+    assert moments[marks > 0.0].tolist() == [0.45]
