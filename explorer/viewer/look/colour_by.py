@@ -265,7 +265,10 @@ class ColourPanel:
             self._colour, lambda look: look.colour_by, lambda sent: {"colour_by": one_of(sent, choices, "colour by")}
         )
         settings.bind(
-            self._automatic, lambda look: look.automatic, lambda sent: {**self._ends(), "automatic": sent is True}
+            self._automatic,
+            lambda look: look.automatic,
+            # Ends that were refused stand in the boxes still; an automatic range asks for none.
+            lambda sent: {"automatic": True} if sent is True else {**self._ends(), "automatic": False},
         )
         settings.bind(self._logarithmic, lambda look: look.logarithmic, lambda sent: {"logarithmic": sent is True})
         settings.listen(self._low, lambda sent: self._fixed(low=checked(sent, -LARGEST, LARGEST, "from")))

@@ -382,6 +382,14 @@ def test_an_entered_end_fixes_the_range_at_what_is_on_the_screen(panel):
         settings.change(low=1.0, high=1.0)
 
 
+def test_an_automatic_range_asks_for_no_ends(panel):
+    """What was refused stands in its box still; the tick is a way out of it."""
+    panel.person.enter("To", 1.0)
+    assert "is not above its beginning" in panel.person.enter("From", 3.0)
+    assert panel.person.enter("Automatic range", True) == ""
+    assert panel.settings.look.automatic
+
+
 def test_a_range_is_reset(panel):
     for label, value in {"Automatic range": False, "Logarithmic": True, "From": 0.5, "To": 2.0}.items():
         assert panel.person.enter(label, value) == ""
