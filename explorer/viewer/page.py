@@ -184,7 +184,8 @@ class People:
         self._server = server
         self._last: int | None = None
         for kind in ACTS:
-            server._websock_server.register_handler(kind, self._acted)
+            # Before viser's own, which hands the act on to the page's loop: who it was has to be known by then.
+            server._websock_server._incoming_handlers.setdefault(kind, []).insert(0, self._acted)
 
         @server.on_client_connect
         def _(client: viser.ClientHandle) -> None:

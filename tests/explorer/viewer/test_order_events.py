@@ -44,17 +44,25 @@ def test_a_study_is_told_once_per_state_and_ends_by_itself(state, asked):
     assert list(orders.in_the_background(STATUS)) == []
 
 
-def people(browsers):
-    """With so many browsers, the second of which has just moved a control."""
-    handlers = {}
+def people(browsers, handed_on=lambda made: None):
+    """With so many browsers, the second of which has just moved a control; ``handed_on``: what viser does with it."""
+    handlers = {GuiUpdateMessage: [lambda client, message: handed_on(made)]}
     server = SimpleNamespace(
         get_clients=lambda: dict.fromkeys(range(browsers)),
         on_client_connect=lambda act: act,
-        _websock_server=SimpleNamespace(register_handler=handlers.__setitem__),
+        _websock_server=SimpleNamespace(_incoming_handlers=handlers),
     )
     made = People(server)
-    handlers[GuiUpdateMessage](1, None)
+    for handler in handlers[GuiUpdateMessage]:
+        handler(1, None)
     return made
+
+
+def test_who_acted_is_known_before_viser_hands_the_act_on():
+    """The page's loop may carry it out at once, in its own thread."""
+    signed = []
+    people(2, lambda made: signed.append(made.signed(Event(1, 0.4, "friction", is_change=True)).text))
+    assert signed == ["friction · browser 2"]
 
 
 def test_an_order_is_signed_and_what_happens_by_itself_is_not():
