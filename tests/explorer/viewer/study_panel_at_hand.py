@@ -1,16 +1,20 @@
 """A panel of studies with a study and a session that only remember, and a person at its controls."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from unittest import mock
 
 from explorer.background.command_process import CommandStatus
 from explorer.live.messages import SessionState, Status
 from explorer.viewer.actions import Actions
 from explorer.viewer.panel import Now
+from explorer.viewer.study import study_panel
 from explorer.viewer.study.study_panel import StudyPanel
 from solver import asset_path, load_material
 from tests.explorer.viewer.page_session import page_context
+from tests.explorer.viewer.person import Person
 
 SCENE = load_material("sunflower_extract")
 
@@ -81,39 +85,50 @@ class FakeSession:
 
 
 class PanelAtHand:
-    """A panel with what it talks to; ``enter`` and ``press`` are a person at a browser."""
+    """A panel with what it talks to, and a person at its controls."""
 
-    def __init__(self, server):
+    def __init__(self, server, place=None):
         self.study, self.session, self.actions = FakeStudy(), FakeSession(), Actions()
-        self.panel = StudyPanel(
-            page_context(server, self.session, self.actions.post, study=self.study, diagnosis=STORELESS)
-        )
+        self.page = page_context(server, self.session, self.actions.post, study=self.study, diagnosis=STORELESS)
+        if place is not None:
+            self.page = replace(self.page, place=place)
+        handed = {}
+        # What the pages of the two tables get; there are no controls of the panel for it.
+        pages = {name: handed_over(name, handed) for name in ("ranges_page", "runs_page")}
+        with server.gui.add_folder("study") as folder, mock.patch.multiple(study_panel, **pages):
+            self.panel = StudyPanel(self.page)
+        self.all_ranges, self.all_runs = handed["ranges_page"], handed["runs_page"]
+        self.person = Person(folder, self.actions.carry_out)
+        self.ranges = self.person.within("Ranges and target of the next study")
+        self.profiler = self.person.within("Profiler")
+        self.others = self.person.within("Other results")
 
     def show(self, notice=""):
         self.panel.show(Now(self.session.status(), notice=notice))
 
-    def enter(self, handle, value):
-        handle.value = value
-        self._call(handle, value)
-        return self.actions.carry_out()
-
     def press(self, button):
-        self._call(self.panel._view._buttons, button)
-        return self.actions.carry_out()
+        """A button of the row *Study*, also one that is not offered now."""
+        return self.person.send("Study", button)
 
     def board(self):
         """The board of the panel, when it is made."""
         self.show()
         return board_at(self.panel)
 
-    def _call(self, handle, value):
-        event = type("Event", (), {"client_id": 0, "target": type("Handle", (), {"value": value})})
-        for callback in handle._impl.update_cb:
-            callback(event)
+
+def handed_over(name, handed):
+    """The function ``name`` of the panel's module, which leaves in ``handed`` what it gets."""
+    made = getattr(study_panel, name)
+
+    def page(in_hand, post):
+        handed[name] = in_hand
+        return made(in_hand, post)
+
+    return page
 
 
 def board_at(panel, address="/study/page.json"):
-    """What the board of ``panel`` draws, once it is made."""
+    """What the board of ``panel`` draws, once it is made: a thread makes it, which nobody at the page sees."""
     panel._board._worker.join(60)
     panel._show_board()
     panel._board._worker.join(60)
@@ -126,5 +141,7 @@ def written(folder, content, name="result.json"):
     return folder
 
 
-def drawn(view):
-    return json.loads(view._chart._plotly_json_str)
+def drawn(person):
+    """The one chart that a person sees."""
+    (chart,) = person.charts
+    return chart

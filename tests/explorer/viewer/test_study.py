@@ -20,7 +20,6 @@ from explorer.study.edit import StudyEdits
 from explorer.study.excluded_runs import load_excluded
 from explorer.study.process import QueuedStudy
 from explorer.viewer.actions import Actions
-from explorer.viewer.panel import Now
 from explorer.viewer.study.order_panel import number_on_screen
 from explorer.viewer.study.plot_view import NOTHING, Drawn, PlotView
 from explorer.viewer.study.process_view import (
@@ -34,14 +33,12 @@ from explorer.viewer.study.process_view import (
     START,
     state_markdown,
 )
-from explorer.viewer.study.study_panel import NONE, StudyPanel
+from explorer.viewer.study.study_panel import NONE
 from explorer.viewer.view import ThemeSwitch
 from solver.scenes.scene import value
-from tests.explorer.viewer.page_session import event, page_context
+from tests.explorer.viewer.person import Person
 from tests.explorer.viewer.study_panel_at_hand import (
     OWN_PROFILES,
-    STORELESS,
-    FakeSession,
     FakeStudy,
     PanelAtHand,
     drawn,
@@ -74,66 +71,61 @@ def test_the_buttons_ask_for_what_they_say(table):
 def test_only_buttons_that_mean_something_now_are_there(table, state, waiting, offered):
     table.study.now, table.study.queued = CommandStatus(state), waiting
     table.show()
-    assert tuple(table.panel._view._buttons.options) == offered
-    assert table.panel._view._bar.visible == (state in ("running", "paused"))
+    assert table.person.options("Study") == offered
+    assert bool(table.person.progress) == (state in ("running", "paused"))
 
 
 def test_what_was_not_stopped_is_not_offered_to_be_resumed(table):
     table.study.resumable = lambda: False
     table.show()
-    assert tuple(table.panel._view._buttons.options) == (START,)
+    assert table.person.options("Study") == (START,)
     # Looked up once per state: it reads folders.
     table.study.resumable = lambda: True
     table.show()
-    assert tuple(table.panel._view._buttons.options) == (START,)
+    assert table.person.options("Study") == (START,)
     table.study.now = CommandStatus("cancelled")
     table.show()
-    assert tuple(table.panel._view._buttons.options) == (START, RESUME)
+    assert table.person.options("Study") == (START, RESUME)
 
 
 def test_the_profiles_of_the_study_file_are_offered_and_started(server, tmp_path, monkeypatch):
     monkeypatch.setattr(FakeStudy, "study_file", study_with_own_profiles(tmp_path))
     table = PanelAtHand(server)
-    chosen = table.panel._profile
+    chosen = table.person.control("Profile")
     assert chosen.options == OWN_PROFILES
     study = load_study(str(table.study.study_file))
     runs = sum(planned_runs(study, study.profiles["first look"]).values())
     assert chosen.hint.startswith(f"first look: coarse shapes, {runs} runs; thesis-2: standard shapes, ")
     assert "fine: standard shapes, as many runs as the pilot asks for" in chosen.hint
     table.press("Start")
-    chosen.value = "thesis-2"
+    table.person.enter("Profile", "thesis-2")
     table.press("Queue")
     assert [one[:2] for one in table.study.asked] == [("start", "first look"), ("queue", "thesis-2")]
 
 
 def test_a_browser_chooses_between_the_scheduler_of_the_server_and_this_machine(server):
     """And names none itself: what another scheduler sends would be run here."""
-    actions, place, at = Actions(), PourPlace("tcp://127.0.0.1:9"), "tcp://127.0.0.1:9"
-    context = page_context(server, FakeSession(), actions.post, study=FakeStudy(), diagnosis=STORELESS)
-    panel = StudyPanel(replace(context, place=place))
-    now = Now(FakeSession().status())
-    chosen = panel._place._list
-    assert (chosen.options, chosen.value) == ((at, HERE), at)
+    place, at = PourPlace("tcp://127.0.0.1:9"), "tcp://127.0.0.1:9"
+    table = PanelAtHand(server, place)
+    person = table.person
+    assert (person.options("Pour on"), person.value("Pour on")) == ((at, HERE), at)
     for sent in ("tcp://evil:1", ["a"], None):
-        chosen.value = sent
-        event(chosen, sent)
-        assert "is not one of tcp://127.0.0.1:9, this machine" in actions.carry_out()
-        panel.show(now)
-        assert chosen.value == place.chosen == at
-    event(chosen, HERE)
-    assert not actions.carry_out()
+        assert "is not one of tcp://127.0.0.1:9, this machine" in person.send("Pour on", sent)
+        table.show()
+        assert person.value("Pour on") == place.chosen == at
+    assert person.enter("Pour on", HERE) == ""
     assert (place.chosen, place.arguments) == (HERE, ())
-    assert PanelAtHand(server).panel._place._list is None
+    assert not PanelAtHand(server).person.sees("Pour on")
 
 
 def test_an_empty_page_says_what_to_do(table):
     board = table.board()
     assert (board["title"], board["charts"]) == ("", [])
-    assert "No study is running" in table.panel._view._text.content
-    assert table.panel._plots._choice.options == (NOTHING,)
-    assert table.panel._plots._chart is None  # plotly.js is not sent for nothing
-    assert "comes with the response surface" in table.panel._profiler._words.content
-    table.panel._profiler._hand_on()
+    assert "No study is running" in table.person.text
+    assert table.profiler.options("Chart") == (NOTHING,)
+    assert table.profiler.charts == []  # plotly.js is not sent for nothing
+    assert "comes with the response surface" in table.profiler.text
+    table.profiler.press("Set the live pour to these values")
     assert table.session.asked == []
 
 
@@ -146,14 +138,14 @@ def test_the_study_at_work_is_named_with_its_own_target(table):
     table.study.present = QueuedStudy("corrected_study", "quick", StudyEdits(), "", None, other)
     table.study.now = CommandStatus("running")
     table.show()
-    assert "**At work:** Trefoil pour 2, profile quick." in table.panel._target.content
-    assert "17.90°" in table.panel._target.content
-    assert "24.68°" not in table.panel._target.content
+    assert "**At work:** Trefoil pour 2, profile quick." in table.person.text
+    assert "17.90°" in table.person.text
+    assert "24.68°" not in table.person.text
     # What it will take stands there until the first pours tell.
-    assert "runs of coarse shapes" in table.panel._view._text.content
+    assert "runs of coarse shapes" in table.person.text
     table.study.now = CommandStatus("cancelled")
     table.show()
-    assert "24.68°" in table.panel._target.content
+    assert "24.68°" in table.person.text
 
 
 def test_stages_failed_runs_and_the_queue_are_told(table):
@@ -170,7 +162,7 @@ def test_stages_failed_runs_and_the_queue_are_told(table):
     )
     table.study.queued = ("standard", "full, changed")
     table.show("no")
-    text = table.panel._view._text.content
+    text = table.person.html
     assert "28 of 112 runs, time left 2 min 05 s" in text
     assert [(one["name"], one["count"], one["mark"]) for one in table.board()["stages"]] == [
         ("pilot", "20 of 20", "done"),
@@ -181,7 +173,7 @@ def test_stages_failed_runs_and_the_queue_are_told(table):
     assert "Waiting: standard; full, changed." in text
     assert "<img" not in text.replace(r"\<", "")
     assert "*bold*" not in text.replace(r"\*bold\*", "")
-    assert table.panel._view._bar.value == 25.0
+    assert table.person.progress == [25.0]
 
 
 def test_a_paused_command_and_one_that_found_no_replacement_say_so():
@@ -204,7 +196,7 @@ def test_a_finished_study_is_a_board_of_verdict_charts_answers_and_runs(table, r
     answers, runs = (next(one for one in board["tables"] if one["title"].startswith(name)) for name in ("Par", "Runs"))
     assert len(answers["rows"]) == len(result["surface"]["factors"])
     assert len(runs["rows"]) == len(runs["opens"]) == result["runs"]["total"]
-    assert table.panel._board._pages.page(board["report"]).body == b"report"
+    assert table.page.pages.page(board["report"]).body == b"report"
     (folder / "result.json").write_text(json.dumps(result | {"scan": None}))
     assert "Scan of an assumption" not in [chart["title"] for chart in table.board()["charts"]]
 
@@ -214,22 +206,22 @@ def test_a_row_of_the_board_pours_that_run_in_the_scene(table, result, tmp_path)
     (runs,) = (one for one in table.board()["tables"] if one["title"].startswith("Runs"))
     asked = next(one for one in runs["opens"] if one["stage"] == "surface" and one["label"].startswith("point 4"))
     # The formula gives other keys than a pour would, and the page says so.
-    table.panel._channel.take(json.dumps(asked))
+    table.page.channel.take(json.dumps(asked))
     assert "have changed since that run" in table.actions.carry_out()
     (poured,) = table.session.asked
     assert (poured[0], poured[2]) == ("restart", asked["seed"])
     for factor, natural in zip(result["surface"]["factors"], result["surface"]["natural"][3], strict=True):
         assert value(poured[1], factor["path"]) == pytest.approx(natural)
-    table.panel._channel.take(json.dumps(asked | {"seed": -1}))
+    table.page.channel.take(json.dumps(asked | {"seed": -1}))
     assert "not in the study that is shown" in table.actions.carry_out()
 
 
 def test_dark_and_light(table, result, tmp_path):
     table.study.out = written(tmp_path / "study-1", result)
     table.show()
-    dark = drawn(table.panel._plots)["layout"]["template"]["layout"]
+    dark = drawn(table.profiler)["layout"]["template"]["layout"]
     table.panel.set_dark(False)
-    light = drawn(table.panel._plots)["layout"]["template"]["layout"]
+    light = drawn(table.profiler)["layout"]["template"]["layout"]
     # plotly_dark writes light text, plotly_white dark text
     assert (dark["font"]["color"], light["font"]["color"]) == ("#f2f5fa", "#2a3f5f")
     assert set(light) == set(plotly.io.templates["plotly_white"].to_plotly_json()["layout"])
@@ -238,12 +230,12 @@ def test_dark_and_light(table, result, tmp_path):
 def test_the_switch_of_the_page_turns_viser_and_the_charts(server, monkeypatch):
     themes, told, actions = [], [], Actions()
     monkeypatch.setattr(server.gui, "configure_theme", lambda **theme: themes.append(theme["dark_mode"]))
-    switch = ThemeSwitch(server, actions.post, told.append)
-    for sent in (False, True):
-        switch._dark.value = sent
-        for callback in switch._dark._impl.update_cb:
-            callback(type("Event", (), {"client_id": 0}))
-        assert actions.carry_out() == ""
+    with server.gui.add_folder("theme") as place:
+        ThemeSwitch(server, actions.post, told.append)
+    person = Person(place, actions.carry_out)
+    (label,) = person.labels
+    for dark in (False, True):
+        assert person.enter(label, dark) == ""
     assert themes == told == [False, True]
 
 
@@ -257,16 +249,17 @@ def test_zoom_belongs_to_one_chart():
 
 def test_what_a_browser_sends_for_the_list_may_be_anything(server):
     actions, made = Actions(), []
-    view = PlotView(server, "Chart", "empty", actions.post)
+    with server.gui.add_folder("plots") as place:
+        view = PlotView(server, "Chart", "empty", actions.post)
+    person = Person(place, actions.carry_out)
     view.offer({"a": Plot(lambda: made.append(1) or {"data": [], "layout": {}}, "caption")}, 1)
+    assert person.text == "caption"
     for sent in ("no such title", ["a"], None, 3):
-        view._choice.value = sent
-        view._draw()
-        assert view._caption.content == "empty"
+        assert person.send("Chart", sent) == ""
+        assert person.text == "empty"
     view.offer({"bad": Plot(lambda: {}["gone"], "caption")}, 2)
-    view._choice.value = "bad"
-    view._draw()
-    assert "cannot be drawn" in view._caption.content
+    person.enter("Chart", "bad")
+    assert "cannot be drawn" in person.text
     assert made == [1]
 
 
@@ -296,77 +289,87 @@ def test_runs_are_left_out_of_the_study_that_is_shown(table, result, tmp_path):
     folder = written(tmp_path / "study-1", result)
     table.study.out, table.study.now = folder, CommandStatus("finished")
     table.show()
-    shown = table.panel._finished()
+    # What the page of the table is handed: there is no control of the panel for it.
+    in_hand = table.all_runs
+    shown = in_hand.result()
     run = shown.surface.runs[0][0]
     excluded = [ExcludedRun(run.label, run.experiment, run.seed, "wedged")]
-    table.panel._leave_out(shown, excluded)
+    in_hand.take(shown, excluded)
     assert load_excluded(folder) == tuple(excluded)
     told = {one["title"]: one["rows"] for one in table.board()["tables"]}
     assert told["Runs left out"] == [[run.label, str(run.seed), "wedged"]]
     with pytest.raises(CommandError, match="another study is shown by now"):
-        table.panel._leave_out(replace(shown), excluded)
-    assert table.panel._left_out == tuple(excluded)
+        in_hand.take(replace(shown), excluded)
+    assert in_hand.excluded() == tuple(excluded)
+
+
+X4, TARGET = "X4 · shear modulus seed [MPa]", "Target: mean [°]"
+
+
+def x7(ranges):
+    return next(label for label in ranges.labels if label.startswith("X7 · "))
+
+
+def started_with(table):
+    """The changes that the study is started with."""
+    table.press(START)
+    return table.study.asked[-1][2]
 
 
 def test_ranges_and_target_are_asked_for_as_entered(table):
-    order = table.panel._order
-    assert not order.edits
-    row = order._rows["X4"]
-    assert row.label == "X4 · shear modulus seed [MPa]"
-    assert row.value == (40.1, 70.5, 56.3)
-    assert table.enter(row, (30.0, 70.5, 56.3)) == ""
-    table.enter(order._goal["mean"], 26.0)
-    assert order._goal["sd"].label == "Target: SD [°]"
-    assert dict(order.edits.factors) == {"X4": {"low": 30e6}}
-    assert dict(order.edits.target) == {"mean": 26.0}
-    assert "| X4 low | 40.1 MPa | 30 MPa |" in order._told.content
-    table.press(START)
-    assert table.study.asked[0][2] == order.edits
+    ranges = table.ranges
+    assert not started_with(table)
+    assert ranges.value(X4) == (40.1, 70.5, 56.3)
+    assert ranges.enter(X4, (30.0, 70.5, 56.3)) == ""
+    ranges.enter(TARGET, 26.0)
+    assert ranges.sees("Target: SD [°]")
+    edits = started_with(table)
+    assert (dict(edits.factors), dict(edits.target)) == ({"X4": {"low": 30e6}}, {"mean": 26.0})
+    assert "| X4 low | 40.1 MPa | 30 MPa |" in ranges.text
     # another factor beside it: both changes hold
-    table.enter(order._rows["X7"], (0.5, *order._rows["X7"].value[1:]))
-    assert set(order.edits.factors) == {"X4", "X7"}
-    table.enter(row, (90.0, 70.5, 56.3))
-    assert "**This study cannot start:** " in order._told.content
-    assert "is not below high" in order._told.content
-    assert "X4 low" in table.enter(row, (math.nan, 70.5, 56.3))
-    order._forget()
-    assert not order.edits
-    assert row.value == (40.1, 70.5, 56.3)
-    assert order._goal["mean"].value == 24.68
+    other = x7(ranges)
+    ranges.enter(other, (0.5, *ranges.value(other)[1:]))
+    assert set(started_with(table).factors) == {"X4", "X7"}
+    ranges.enter(X4, (90.0, 70.5, 56.3))
+    assert "**This study cannot start:** " in ranges.text
+    assert "is not below high" in ranges.text
+    assert "X4 low" in ranges.send(X4, (math.nan, 70.5, 56.3))
+    ranges.press("Reset to file")
+    assert not started_with(table)
+    assert ranges.value(X4) == (40.1, 70.5, 56.3)
+    assert ranges.value(TARGET) == 24.68
 
 
 def test_all_ranges_are_taken_from_a_table_or_none(table):
-    order = table.panel._order
-    rows = {row.name: row for row in order.ranges()}
+    in_hand = table.all_ranges
+    rows = {row.name: row for row in in_hand.rows()}
     assert (rows["X4"].label, rows["X4"].unit, rows["X4"].range) == ("shear modulus seed", "MPa", (40.1, 70.5, 56.3))
-    assert len(rows) == len(order._rows)
     ranges = {name: row.range for name, row in rows.items()}
-    order.take_ranges(ranges)
-    assert not order.edits
+    in_hand.take(ranges)
+    assert not started_with(table)
     with pytest.raises(ValueError, match="X7 low"):
-        order.take_ranges(ranges | {"X4": (30.0, 70.5, 56.3), "X7": (math.nan, 1.0, 1.0)})
-    assert not order.edits
-    order.take_ranges(ranges | {"X4": (30.0, 70.5, 56.3)})
-    assert dict(order.edits.factors) == {"X4": {"low": 30e6}}
-    assert order._rows["X4"].value == (30.0, 70.5, 56.3)
-    assert "| X4 low | 40.1 MPa | 30 MPa |" in order._told.content
+        in_hand.take(ranges | {"X4": (30.0, 70.5, 56.3), "X7": (math.nan, 1.0, 1.0)})
+    assert not started_with(table)
+    in_hand.take(ranges | {"X4": (30.0, 70.5, 56.3)})
+    assert dict(started_with(table).factors) == {"X4": {"low": 30e6}}
+    assert table.ranges.value(X4) == (30.0, 70.5, 56.3)
+    assert "| X4 low | 40.1 MPa | 30 MPa |" in table.ranges.text
 
 
 def test_every_factor_has_a_row_and_what_is_shown_as_in_the_file_is_no_change(table):
-    order = table.panel._order
-    assert len(order._rows) == len(load_study(str(table.study.study_file)).factors)
-    for name, row in order._rows.items():
-        assert table.enter(row, row.value) == "", name
-    order._take_target()
-    assert not order.edits
+    ranges = table.ranges
+    rows = [label for label in ranges.labels if " · " in label]
+    assert len(rows) == len(load_study(str(table.study.study_file)).factors)
+    for label in (*rows, TARGET):
+        assert ranges.enter(label, ranges.value(label)) == "", label
+    assert not started_with(table)
     assert number_on_screen(1 / 3) == 0.333333
 
 
-def test_a_study_file_that_cannot_be_read_leaves_the_page_standing(server, tmp_path):
-    table = FakeStudy()
-    table.study_file = tmp_path / "gone.toml"
-    panel = StudyPanel(page_context(server, FakeSession(), Actions().post, study=table, diagnosis=STORELESS))
-    assert "cannot be read" in panel._order._told.content
-    assert panel._profile.options == (NONE,)
-    assert not panel._order.edits
-    panel.show(Now(FakeSession().status()))
+def test_a_study_file_that_cannot_be_read_leaves_the_page_standing(server, tmp_path, monkeypatch):
+    monkeypatch.setattr(FakeStudy, "study_file", tmp_path / "gone.toml")
+    table = PanelAtHand(server)
+    assert "cannot be read" in table.ranges.text
+    assert table.person.options("Profile") == (NONE,)
+    assert not started_with(table)
+    table.show()
