@@ -6,7 +6,6 @@ import shlex
 import zipfile
 from dataclasses import replace
 from html import unescape
-from types import SimpleNamespace
 
 import numpy as np
 import openpyxl
@@ -32,7 +31,6 @@ from explorer.viewer.laboratory.measured_data_panel import BALANCES, NOTHING, PH
 from explorer.viewer.laboratory.photograph_panel import NO_BOARD, PhotographPanel
 from explorer.viewer.laboratory.rig_panel import RigPanel
 from explorer.viewer.panel import Now
-from explorer.viewer.study.diagnosis_panel import DiagnosisPanel
 from explorer.viewer.study.reports_panel import NONE, ReportsPanel
 from solver.assets import asset_path
 from tests.explorer.command_line import explorer
@@ -553,7 +551,6 @@ def test_measured_data_become_a_choice_of_the_diagnosis(room, tmp_path):
     assert first.offered["angle_of_repose_deg"].values.tolist() == [24.1, 25.0, 26.2]
     assert "role: A is fitted" in data.text
     assert "In the list of Diagnose: lot_7." in data.text
-    assert "lot_7" in DiagnosisPanel._offered(SimpleNamespace(_shipped=(), _uploads=uploads))
     # The same again by the command line.
     words = shlex.split(command_in(data))[1:]
     words[words.index("--out") + 1] = str(tmp_path / "again")

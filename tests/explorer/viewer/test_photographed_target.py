@@ -23,9 +23,11 @@ from explorer.viewer.laboratory.photograph_panel import PhotographPanel
 from explorer.viewer.panel import Now
 from explorer.viewer.shell.state_line import StateLine
 from explorer.viewer.shell.web_pages import WebPages
+from explorer.viewer.study.process_view import START
 from explorer.viewer.study.study_panel import StudyPanel
 from tests.explorer import reported_studies
-from tests.explorer.viewer.page_session import PageSession, event, finished, page_context
+from tests.explorer.viewer.page_session import PageSession, finished, page_context
+from tests.explorer.viewer.person import Person
 from tests.explorer.viewer.study_panel_at_hand import FakeStudy
 from tests.solver.photograph.rendered import Look, photograph, solid_cover
 
@@ -35,6 +37,9 @@ def picture(angle, seed=0):
     file = io.BytesIO()
     Image.fromarray(photograph(solid_cover(angle, angle, 110), Look(width=700, seed=seed))).save(file, "PNG")
     return file.getvalue()
+
+
+USE, ADD, REMOVE = "Use as target", "Add to the target", "Remove the target"
 
 
 class ProjectPage:
@@ -47,30 +52,27 @@ class ProjectPage:
         self.actions, self.session = Actions(), PageSession(material_source("sunflower_extract"))
         page = page_context(server, self.session, self.actions.post, folder / "data", study, FakeStudy())
         self.page = replace(page, project=self.project)
-        self.photograph, self.calibrate = PhotographPanel(self.page), StudyPanel(self.page)
-        self.line = StateLine(self.page)
+        self._panels, places = [StateLine(self.page)], []
+        for kind in (PhotographPanel, StudyPanel):
+            with server.gui.add_folder(kind.name) as place:
+                self._panels.append(kind(self.page))
+            places.append(place)
+        self.photograph, self.calibrate = (Person(place, self.done) for place in places)
         self.show()
 
     def show(self):
-        for panel in (self.photograph, self.calibrate, self.line):
+        for panel in self._panels:
             panel.show(Now(self.session.now))
 
-    def do(self, act):
-        self.actions.post(act)
-        notice = finished(self.actions, self.page.bench_work)
-        self.show()
-        return notice
-
-    def press(self, button):
-        event(button, True)
+    def done(self):
         notice = finished(self.actions, self.page.bench_work)
         self.show()
         return notice
 
     def read(self, content, name="pile.png", scale=0.5):
-        assert self.do(lambda: self.photograph._photo.take(name, content)) == ""
-        self.photograph._scale.value = scale
-        return self.do(self.photograph._read)
+        assert self.photograph.upload("Upload: photograph", name, content) == ""
+        self.photograph.enter("Scale [mm per pixel]", scale)
+        return self.photograph.press("Read the angle")
 
     @property
     def measured(self):
@@ -79,8 +81,7 @@ class ProjectPage:
 
     @property
     def disabled(self):
-        panel = self.photograph
-        return [button.disabled for button in (panel._use, panel._add, panel._remove)]
+        return [self.photograph.control(label).disabled for label in (USE, ADD, REMOVE)]
 
 
 @pytest.fixture
@@ -92,24 +93,24 @@ def folder(tmp_path):
 def test_what_was_read_becomes_the_target_and_is_there_after_a_restart(server, folder):
     page = ProjectPage(server, folder)
     assert (page.measured["state"], page.measured["said"]) == ("assumed", "25.00° ± 2.00°")
-    assert "25.00° ± 2.00° SD \\(assumed, n = 10\\)" in page.calibrate._target.content
+    assert "25.00° ± 2.00° SD \\(assumed, n = 10\\)" in page.calibrate.text
     assert page.disabled == [True, True, True]
     assert page.read(picture(27.0)) == ""
     assert page.disabled == [False, True, True]
-    assert page.press(page.photograph._use) == ""
+    assert page.photograph.press(USE) == ""
     target = load_target(folder / FOLDER)
     assert (target.n, target.mean) == (1, pytest.approx(27.0, abs=0.15))
     for shown in (page, ProjectPage(server, folder)):
         assert shown.measured["state"] == "assumed"  # one pile: how piles differ is not measured
         assert shown.measured["said"] == f"{target.mean:.2f}° (standard error {target.sd:.2f}°) · photograph"
         assert "how piles differ among each other is in neither" in shown.measured["hint"]
-        assert "read off pile.png" in shown.calibrate._target.content
+        assert "read off pile.png" in shown.calibrate.text
         # The answer and the target give the same two numbers the same names.
         shown_twice = f"{target.mean:.2f}° (95 % {target.mean - 2 * target.sd:.2f} … "
         shown_twice += f"{target.mean + 2 * target.sd:.2f}°; standard error {target.sd:.2f}°)"
         assert shown_twice in shown.measured["hint"]
-        assert shown_twice in page.photograph.view._text.content.replace("\u00a0", " ")
-        assert "One photograph" in shown.photograph._told.content
+        assert shown_twice in page.photograph.text
+        assert "One photograph" in shown.photograph.text
         assert shown.disabled[2] is False
     assert (folder / FOLDER / target.result.piles[0].name).read_bytes() == picture(27.0)
 
@@ -124,39 +125,39 @@ def test_a_photograph_is_read_once_for_its_answer_and_its_target(server, folder,
     monkeypatch.setattr("explorer.laboratory.command_results.run_measure", counted)
     page = ProjectPage(server, folder)
     assert page.read(picture(27.0)) == ""
-    assert page.press(page.photograph._use) == ""
-    assert page.press(page.photograph._remove) == ""
-    assert page.press(page.photograph._use) == ""
+    assert page.photograph.press(USE) == ""
+    assert page.photograph.press(REMOVE) == ""
+    assert page.photograph.press(USE) == ""
     assert len(readings) == 1
 
 
 def test_more_piles_are_added_and_the_target_removed(server, folder):
     page = ProjectPage(server, folder)
-    for k, (angle, button) in enumerate(((24.0, "_use"), (27.0, "_add"), (30.0, "_add")), start=1):
+    for k, (angle, button) in enumerate(((24.0, USE), (27.0, ADD), (30.0, ADD)), start=1):
         assert page.read(picture(angle, k), f"pile {k}.png") == ""
-        assert page.press(getattr(page.photograph, button)) == ""
+        assert page.photograph.press(button) == ""
     target = load_target(folder / FOLDER)
     # Of 24, 27 and 30: mean 27, SD 3.
     assert (target.n, target.mean, target.sd) == (3, pytest.approx(27.0, abs=0.15), pytest.approx(3.0, abs=0.2))
     assert page.measured["said"] == f"27.0° (standard deviation {target.sd:.1f}°) · 3 photographs"
-    assert "standard error of the mean" in page.calibrate._target.content
-    assert "is in the target already" in page.press(page.photograph._add)
+    assert "standard error of the mean" in page.calibrate.text
+    assert "is in the target already" in page.photograph.press(ADD)
     assert load_target(folder / FOLDER).n == 3
-    assert page.press(page.photograph._use) == ""  # the last one alone
+    assert page.photograph.press(USE) == ""  # the last one alone
     assert load_target(folder / FOLDER).mean == pytest.approx(30.0, abs=0.15)
-    assert page.press(page.photograph._remove) == ""
+    assert page.photograph.press(REMOVE) == ""
     assert not (folder / FOLDER).exists()
     assert (page.measured["state"], page.disabled) == ("assumed", [False, True, True])
-    assert "From the study's file" in page.calibrate._target.content
+    assert "From the study's file" in page.calibrate.text
 
 
 def test_what_shows_no_pile_is_refused_in_a_line(server, folder):
     page = ProjectPage(server, folder)
-    assert "read a photograph first" in page.do(lambda: page.photograph._keep(anew=True))
+    assert "read a photograph first" in page.photograph.send(USE, True)
     blank = io.BytesIO()
     Image.fromarray(np.full((200, 300), 150, dtype=np.uint8)).save(blank, "PNG")
     assert page.read(blank.getvalue(), "blank.png") == ""
-    notice = page.press(page.photograph._use)
+    notice = page.photograph.press(USE)
     assert "no angle: blank" in notice
     assert "\n" not in notice
     assert not (folder / FOLDER).exists()
@@ -166,32 +167,34 @@ def test_what_shows_no_pile_is_refused_in_a_line(server, folder):
 def test_what_is_kept_is_what_was_read_and_not_what_is_chosen_since(server, folder):
     page = ProjectPage(server, folder)
     assert page.read(picture(24.0), "first.png") == ""
-    page.do(lambda: page.photograph._photo.take("second.png", picture(30.0)))
-    page.photograph._scale.value = 0.0
-    assert page.press(page.photograph._use) == ""
+    page.photograph.upload("Upload: photograph", "second.png", picture(30.0))
+    page.photograph.enter("Scale [mm per pixel]", 0.0)
+    assert page.photograph.press(USE) == ""
     target = load_target(folder / FOLDER)
     assert (target.mean, target.result.piles[0].unit) == (pytest.approx(24.0, abs=0.15), "m")
 
 
 def test_the_boxes_of_the_target_are_hidden_while_photographs_hold(server, folder):
     page = ProjectPage(server, folder)
-    order = page.calibrate._order
-    order._goal["mean"].value, order._goal["margin"].value = 20.0, 1.5
-    event(order._goal["mean"], 20.0)
-    page.actions.carry_out()
-    assert order.edits == StudyEdits({}, {"mean": 20.0, "margin": 1.5})
+    goal = page.calibrate.within("Ranges and target of the next study")
+    boxes = ["Target: mean [°]", "Target: SD [°]", "Target: counts as met within ± [°]", "Target: measured piles"]
+    shown = [label for label in goal.labels if label.startswith("Target: ")]
+    assert shown == boxes
+
+    def asked():
+        page.calibrate.send("Study", START)
+        return page.page.study.asked[-1][2]
+
+    goal.enter(boxes[0], 20.0)
+    goal.enter(boxes[2], 1.5)
+    assert asked() == StudyEdits({}, {"mean": 20.0, "margin": 1.5})
     page.read(picture(27.0))
-    page.press(page.photograph._use)
-    assert order.edits == StudyEdits({}, {"margin": 1.5})
-    assert {key: box.visible for key, box in order._goal.items()} == {
-        "mean": False,
-        "sd": False,
-        "n": False,
-        "margin": True,
-    }
-    page.press(page.photograph._remove)
-    assert all(box.visible for box in order._goal.values())
-    assert order.edits.target == {"mean": 20.0, "margin": 1.5}
+    page.photograph.press(USE)
+    assert asked() == StudyEdits({}, {"margin": 1.5})
+    assert [label for label in goal.labels if label.startswith("Target: ")] == [boxes[2]]
+    page.photograph.press(REMOVE)
+    assert [label for label in goal.labels if label.startswith("Target: ")] == boxes
+    assert asked().target == {"mean": 20.0, "margin": 1.5}
 
 
 def test_a_study_of_another_observable_refuses_before_anything_is_kept(server, folder):
@@ -202,7 +205,7 @@ def test_a_study_of_another_observable_refuses_before_anything_is_kept(server, f
     study.write_text(text.replace('observable = "angle_of_repose_deg"', 'observable = "bulk_density_kg_m3"'))
     assert load_study(str(study)).targets[0].observable == "bulk_density_kg_m3"
     page.read(picture(27.0))
-    assert "a photograph gives angle_of_repose_deg" in page.press(page.photograph._use)
+    assert "a photograph gives angle_of_repose_deg" in page.photograph.press(USE)
     assert not (folder / FOLDER).exists()
 
 
