@@ -16,7 +16,7 @@ from doe.declared.given import Given, with_given
 from doe.declared.pours import measured_profile
 from doe.diagnose.budget import Budget, scaled_budget
 from doe.diagnose.confirm import CONTRADICTED, Confirmed
-from doe.diagnose.diagnosis import Diagnosis, run_diagnosis
+from doe.diagnose.diagnosis import Diagnosis, joined, run_diagnosis
 from doe.diagnose.levels import STRONG
 from doe.diagnose.posterior import FITS, NOTHING, OUTSIDE, PAIRS
 from doe.diagnose.verdict import CREDIBLE, NOTHING_AT_ONCE, NOTHING_FROM
@@ -29,7 +29,6 @@ from explorer.background.output_folder import kept_for_one, read_result
 from explorer.background.progress import PourProgress
 from explorer.background.reporter import Reporter
 from explorer.diagnosis.corrected import corrected_toml, study_toml
-from explorer.diagnosis.earlier import NOTHING_BEFORE, Earlier, earlier_answer
 from explorer.diagnosis.next_folder import read_next, write_next
 from explorer.diagnosis.result import (
     CORRECTED,
@@ -93,6 +92,26 @@ class DiagnoseOrder:
     """New file for the answer as a recording."""
     scheduler: str = ""
     """Address of a Dask scheduler whose workers pour; "" for processes of this machine."""
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """An earlier answer that a diagnosis goes on from.
+
+    given: effects with their amplitudes. follow_ups: what was measured for the answers before.
+    """
+
+    given: Given
+    follow_ups: tuple[Measurement, ...] = ()
+
+    def carried_into(self, measurement: Measurement) -> Measurement:
+        """``measurement`` with the follow-ups among its fitted conditions, and the effects in its model."""
+        for one in self.follow_ups:
+            measurement = joined(measurement, one)
+        return with_given(measurement, self.given)
+
+
+NOTHING_BEFORE = Earlier({})
 
 
 def run_diagnose(order: DiagnoseOrder, reporter: Reporter) -> DiagnosisResult:
@@ -196,6 +215,33 @@ def _finished(order: DiagnoseOrder) -> DiagnosisResult | None:
     usual = DiagnosisOrder(result.order.out, (), None, 0, None)
     if Path(result.data.folder).absolute() != order.folder.absolute() or asked not in (usual, result.order):
         raise CommandError(f"--out {order.out}: holds the answer to another question")
+    return result
+
+
+def earlier_answer(folder: Path) -> Earlier:
+    """What the finished diagnosis in ``folder`` hands on, with the follow-ups of those that it goes on from itself.
+
+    Raises CommandError, in one line, where there is none, or no effect in it is as probable as a name has to be.
+    """
+    result = _earlier_result(folder)
+    given = result.handed_on()
+    if not given:
+        raise CommandError(
+            f"--given {folder}: {result.verdict}; allowed: a diagnosis in which an effect has {result.threshold:.0%}"
+        )
+    follow_ups: list[Measurement] = []
+    while True:
+        if result.order.follow_up:
+            follow_ups.insert(0, read_next(Path(result.order.follow_up)).measurement)
+        if not result.order.given:
+            return Earlier(given, tuple(follow_ups))
+        result = _earlier_result(Path(result.order.given))
+
+
+def _earlier_result(folder: Path) -> DiagnosisResult:
+    result = read_result(DiagnosisResult, folder, DiagnosisResult.NAME)
+    if result is None:
+        raise CommandError(f"--given {folder}: holds no {DiagnosisResult.NAME}; allowed: a finished diagnosis")
     return result
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from doe.declared.model import effect_values
 from doe.measurement import load_measurement
-from explorer.diagnosis.earlier import NOTHING_BEFORE, earlier_answer
+from explorer.diagnosis.run import NOTHING_BEFORE, earlier_answer
 from explorer.errors import CommandError
 from explorer.report.diagnosis import diagnosis_report
 from explorer.report.diagnosis.answer import verdict_sentence
