@@ -13,6 +13,6 @@ def result():
 
 
 @pytest.fixture
-def table(server):
+def table(server, tmp_path):
     """The panel with a person at its controls."""
-    return PanelAtHand(server)
+    return PanelAtHand(server, data=tmp_path / "data")

@@ -87,9 +87,9 @@ class FakeSession:
 class PanelAtHand:
     """A panel with what it talks to, and a person at its controls."""
 
-    def __init__(self, server, place=None):
+    def __init__(self, server, place=None, data=Path("nowhere")):
         self.study, self.session, self.actions = FakeStudy(), FakeSession(), Actions()
-        self.page = page_context(server, self.session, self.actions.post, study=self.study, diagnosis=STORELESS)
+        self.page = page_context(server, self.session, self.actions.post, data, self.study, STORELESS)
         if place is not None:
             self.page = replace(self.page, place=place)
         handed = {}
