@@ -127,6 +127,13 @@ def declare(measurement: Measurement, effects: Sequence[str]) -> Declared:
     scenes = [condition.scene for condition in measurement.conditions]
     known = {effect_of(p.path) for p in measurement.parameters}
     effects = [name for name in effects if name not in known and all(scene.contact.carries(name) for scene in scenes)]
+    # Beside an amplitude that is calibrated an effect has to be possible at both ends of that.
+    amplitudes = [p for p in measurement.parameters if effect_of(p.path)]
+    scenes = [
+        with_values(one.scene, {p.path: in_rig_frame(p.path, getattr(p, end), one.turned) for p in amplitudes})
+        for one in measurement.conditions
+        for end in (("low", "high") if amplitudes else ("low",))
+    ]
     return Declared(
         tuple(box_of(p) for p in measurement.parameters),
         tuple(widest(name, scenes) for name in effects),

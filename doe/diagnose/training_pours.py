@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from doe.declared.model import Declared, possible
+from doe.declared.model import Declared, effect_of, possible
 from doe.declared.points import AS_IT_IS, Direction, Point, View, base_points, directions_of, effect_points
 from doe.declared.pours import ModelPours, PointPour, Search
 from doe.diagnose.budget import Budget
@@ -27,7 +27,7 @@ from doe.errors import StatisticsError
 from doe.measurement.measurement import Condition
 from doe.measurement.sight import PERFECT, Sight
 from doe.measurement.summaries import summary_names
-from solver import Scene, actual, pour_rig
+from solver import EFFECTS, Scene, actual, pour_rig
 
 FloatArray = npt.NDArray[np.float64]
 Say = Callable[[str], None]
@@ -81,7 +81,10 @@ class TrainingPours:
         self._rows: dict[Point, list[PointPour]] = {}
         self._tried: list[tuple[Direction, float, list[Point]]] = []
         self._directions = [one for effect in declared.effects for one in directions_of(effect)]
-        self._turned = all(unchanged_by_a_quarter_turn(condition.scene) for condition in conditions)
+        # A direction that is calibrated is another one in every pour of the base model.
+        self._turned = all(unchanged_by_a_quarter_turn(condition.scene) for condition in conditions) and not any(
+            len(EFFECTS[name].amplitudes) > 1 for p in declared.parameters if (name := effect_of(p.name))
+        )
         self._heaps = all(pour_rig(condition.scene).leaves_heap for condition in conditions)
         base = base_points(declared, budget.base)
         self._keep(base, pours.run("base model", base), -1, 0.0)

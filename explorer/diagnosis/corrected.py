@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import tomlkit
 
-from doe.declared.model import effect_values
 from doe.diagnose.diagnosis import Diagnosis, complete_rows
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summary_names
 from doe.studies.study import CALIBRATED
+from explorer.diagnosis.piles import model_scene
 from explorer.diagnosis.result import SHORT_PROFILE
 from explorer.scene.text import material_toml
-from solver import EFFECTS, Scene, observable_names, parameters, value, with_values
+from solver import EFFECTS, Scene, observable_names, parameters, value
 
 SHORT = {"pilot_runs": 6, "change_runs": 3, "ascent_replicates": 1, "verification_runs": 6} | {
     f"{part}_replicates": 1 for part in ("screening", "assumption", "scan", "surface")
@@ -124,7 +124,4 @@ def _targets(condition: Condition, diagnosis: Diagnosis, scene: Scene) -> list[d
 def corrected_scene(measurement: Measurement, diagnosis: Diagnosis) -> Scene:
     """The scene that :func:`corrected_toml` writes."""
     model = (diagnosis.after if diagnosis.verdict.names else diagnosis.before).model
-    values: dict[str, float | str] = dict(zip((p.path for p in measurement.parameters), model.theta, strict=True))
-    for effect, amplitudes in model.effects:
-        values |= effect_values(effect, amplitudes)
-    return with_values(measurement.fit[0].scene, dict(values))
+    return model_scene(measurement, measurement.fit[0], model)

@@ -12,7 +12,7 @@ import math
 import re
 import shlex
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -70,11 +70,17 @@ class NextFolder:
 
 
 def write_next(
-    folder: Path, source: Path, measurement: Measurement, suggestion: Suggestion, given: Path | None = None
+    folder: Path,
+    source: Path,
+    measurement: Measurement,
+    suggestion: Suggestion,
+    given: Path | None = None,
+    taken: Sequence[str] = (),
 ) -> None:
     """Write ``suggestion``, a change of a condition of ``measurement`` as read from ``source``, to the new ``folder``.
 
-    ``given``: the finished diagnosis that the command which takes it is to name as well.
+    ``given``: the finished diagnosis that the command which takes it is to name as well. ``taken``: names of further
+    conditions, by earlier follow-ups.
 
     Raises CommandError in one line for a folder that is not empty, and for a change that no condition can state.
     """
@@ -86,7 +92,7 @@ def write_next(
     table = read_toml(source / FILE)
     condition = next(one for one in measurement.conditions if one.name == suggestion.condition)
     stated = next(one for one in table["condition"] if one["name"] == condition.name)
-    name, change = _free_name(suggestion, measurement), suggestion.experiment.name
+    name, change = _free_name(suggestion, measurement, taken), suggestion.experiment.name
     changed = as_suggested(condition, suggestion).scene
     entry = _changed_entry(stated, name, measurement, suggestion, changed)
     title = f"{measurement.title or source.name}: follow-up, {change}"
@@ -155,10 +161,10 @@ def _holds_value(table: Path) -> bool:
 # The data set
 
 
-def _free_name(suggestion: Suggestion, measurement: Measurement) -> str:
+def _free_name(suggestion: Suggestion, measurement: Measurement, others: Sequence[str]) -> str:
     """The change as a file's name, and no condition's: a diagnosis takes the new data beside the old ones."""
     slug = re.sub(r"[^a-z0-9]+", "_", suggestion.experiment.name.lower()).strip("_") or "follow_up"
-    taken = {condition.name for condition in measurement.conditions}
+    taken = {*others, *(condition.name for condition in measurement.conditions)}
     return next(one for k in range(1, len(taken) + 2) if (one := slug if k == 1 else f"{slug}_{k}") not in taken)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.declared.given import with_given
-from doe.declared.model import effect_values
+from doe.declared.model import effect_values, in_rig_frame
 from doe.diagnose.result import CalibratedModel
 from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Condition, Measurement
@@ -96,7 +96,10 @@ def poured_angle(result: DiagnosisResult, model: PouredModel, condition: str) ->
 
 def model_scene(measurement: Measurement, condition: Condition, model: CalibratedModel) -> Scene:
     """``model`` in the set-up of ``condition``."""
-    values = dict(zip((one.path for one in measurement.parameters), model.theta, strict=True))
+    values = {
+        one.path: in_rig_frame(one.path, theta, condition.turned)
+        for one, theta in zip(measurement.parameters, model.theta, strict=True)
+    }
     for effect, amplitudes in model.effects:
         values |= effect_values(effect, amplitudes, condition.turned)
     return with_values(condition.scene, dict(values))

@@ -6,13 +6,14 @@ import json
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from doe.declared.given import Given, with_given
+from doe.declared.model import effect_values
 from doe.declared.pours import measured_profile
 from doe.diagnose.budget import Budget, scaled_budget
 from doe.diagnose.confirm import CONTRADICTED, Confirmed
@@ -55,7 +56,7 @@ from explorer.files.run_result import made_today, versions
 from explorer.report.diagnosis import diagnosis_report
 from explorer.report.folder import write_report
 from explorer.study.duration import large_pour_text
-from solver import EFFECTS, Executor, executor
+from solver import EFFECTS, Executor, executor, value
 
 RULE = Rule(
     prior_nothing=NOTHING,
@@ -134,7 +135,13 @@ def run_diagnose(order: DiagnoseOrder, reporter: Reporter) -> DiagnosisResult:
     if order.out.is_file() or (order.out.is_dir() and any(order.out.iterdir()) and not order.resume):
         raise CommandError(f"--out {order.out}: is not empty; name a new folder, or add --resume to go on there")
     asked = read_next(order.follow_up) if order.follow_up else None
-    earlier = earlier_answer(order.given) if order.given else NOTHING_BEFORE
+    earlier = NOTHING_BEFORE
+    if order.given is not None:
+        if order.given.resolve() == order.out.resolve():
+            raise CommandError(f"--given {order.given}: is --out too; allowed: another folder")
+        earlier = earlier_answer(order.given, order.folder)
+    if set(order.effects or EFFECTS) <= set(earlier.given):
+        raise CommandError("--effects: all of them are in the model by --given; allowed: others too")
     # The executor before anything is in the folder: perhaps no scheduler answers.
     with kept_for_one(order.out), executor(order.threads, order.scheduler) as pool:
         reporter.begin(order.out, order.resume)
@@ -182,7 +189,8 @@ def _run(
     if missing:
         say(missing)
     if found.suggestions:
-        write_next(order.out / "next", order.folder, as_declared, found.suggestions[0], order.given)
+        joined_names = [condition.name for condition in found.conditions]
+        write_next(order.out / "next", order.folder, as_declared, found.suggestions[0], order.given, joined_names)
         say(f"{order.out}/next: what to measure next, to be filled in; then --follow-up {order.out}/next")
     if order.apply:
         write_whole(order.out / CORRECTED, corrected_toml(measurement, found))
@@ -209,19 +217,21 @@ def _finished(order: DiagnoseOrder) -> DiagnosisResult | None:
         order.effects,
         order.budget,
         order.seed,
-        str(order.follow_up) if order.follow_up else None,
-        str(order.given) if order.given else None,
+        _absolute(order.follow_up),
+        _absolute(order.given),
     )
     usual = DiagnosisOrder(result.order.out, (), None, 0, None)
-    if Path(result.data.folder).absolute() != order.folder.absolute() or asked not in (usual, result.order):
+    known = replace(result.order, follow_up=_absolute(result.order.follow_up), given=_absolute(result.order.given))
+    if Path(result.data.folder).absolute() != order.folder.absolute() or asked not in (usual, known):
         raise CommandError(f"--out {order.out}: holds the answer to another question")
     return result
 
 
-def earlier_answer(folder: Path) -> Earlier:
-    """What the finished diagnosis in ``folder`` hands on, with the follow-ups of those that it goes on from itself.
+def earlier_answer(folder: Path, data: Path) -> Earlier:
+    """What the finished diagnosis in ``folder`` hands on to one of ``data``, with the follow-ups of those before it.
 
-    Raises CommandError, in one line, where there is none, or no effect in it is as probable as a name has to be.
+    Raises CommandError, in one line, where there is none, no effect in it is as probable as a name has to be, or its
+    follow-up belongs to other data.
     """
     result = _earlier_result(folder)
     given = result.handed_on()
@@ -230,12 +240,19 @@ def earlier_answer(folder: Path) -> Earlier:
             f"--given {folder}: {result.verdict}; allowed: a diagnosis in which an effect has {result.threshold:.0%}"
         )
     follow_ups: list[Measurement] = []
+    seen = {folder.resolve()}
     while True:
         if result.order.follow_up:
+            if Path(result.data.folder).resolve() != data.resolve():
+                raise CommandError(f"--given {folder}: has a follow-up of {result.data.folder}; allowed: of {data}")
             follow_ups.insert(0, read_next(Path(result.order.follow_up)).measurement)
         if not result.order.given:
             return Earlier(given, tuple(follow_ups))
-        result = _earlier_result(Path(result.order.given))
+        before = Path(result.order.given).resolve()
+        if before in seen:
+            raise CommandError(f"--given {folder}: goes on from {before}, which goes on from itself")
+        seen.add(before)
+        result = _earlier_result(before)
 
 
 def _earlier_result(folder: Path) -> DiagnosisResult:
@@ -243,6 +260,11 @@ def _earlier_result(folder: Path) -> DiagnosisResult:
     if result is None:
         raise CommandError(f"--given {folder}: holds no {DiagnosisResult.NAME}; allowed: a finished diagnosis")
     return result
+
+
+def _absolute(path: Path | str | None) -> str | None:
+    """As it stays true in another working directory; None for none."""
+    return str(Path(path).absolute()) if path else None
 
 
 def _recorded(path: Path, result: DiagnosisResult, say: Callable[[str], None]) -> None:
@@ -302,10 +324,13 @@ def result_of(
             order.effects,
             order.budget,
             order.seed,
-            str(order.follow_up) if order.follow_up else None,
-            str(order.given) if order.given else None,
+            _absolute(order.follow_up),
+            _absolute(order.given),
         ),
-        given={name: tuple(amplitude) for name, amplitude in given.items()},
+        given={
+            name: tuple(float(value(measurement.scene, path)) for path in effect_values(name, amplitude))
+            for name, amplitude in given.items()
+        },
         units=units,
         pours=PourCounts(found.pours, found.settings),
         timing=Duration(total_s),

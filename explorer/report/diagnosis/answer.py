@@ -74,7 +74,16 @@ def _what_next(result: DiagnosisResult) -> str:
         case "ambiguous":
             return f"{_asked_for(result)} `explorer diagnose … --follow-up` takes them."
         case "unexplained":
-            return "Pour the same set-up again, and check scale, units and the set-up before looking for new physics."
+            further = ""
+            if result.handed_on():
+                further = (
+                    " Two effects at once look like one that comes near: what is missing beside it, "
+                    f"`explorer diagnose … --given {result.order.out}` asks."
+                )
+            return (
+                "Pour the same set-up again, and check scale, units and the set-up before looking for new physics."
+                + further
+            )
 
 
 def in_short(result: DiagnosisResult) -> Section:
@@ -101,7 +110,7 @@ def verdict_sentence(result: DiagnosisResult) -> str:
     if not result.given:
         return _verdict(result)
     known = enumeration([code(name) for name in result.given])
-    return f"The declared model holds {known} here, as an earlier diagnosis found. {_verdict(result)}"
+    return f"The declared model holds {known} here, by an earlier diagnosis. {_verdict(result)}"
 
 
 def _verdict(result: DiagnosisResult) -> str:

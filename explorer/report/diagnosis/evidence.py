@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from doe.declared.model import effect_of
 from doe.diagnose.result import BASE, EffectRow
 from doe.holdout import OVERALL
 from doe.measurement.measurement import Role
@@ -313,6 +314,8 @@ def strained(result: DiagnosisResult) -> list[str]:
     """A sentence for every parameter that the fit drives to an end of its range or far from its measured mean."""
     found = []
     for row in result.parameters:
+        if effect_of(row.name) in result.given:  # its range is about an earlier answer, and nobody measured it
+            continue
         models = ((BASE, row.before), (result.final, row.after))
         for model, value in models if result.added else models[:1]:
             where = ""

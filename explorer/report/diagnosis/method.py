@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 
+from doe.declared.model import effect_of
 from doe.holdout import OVERALL
 from explorer.diagnosis.result import DiagnosisResult, answers
 from explorer.report.content import Block, Bullets, Code, Section, Table, Text
@@ -16,7 +17,7 @@ from explorer.report.diagnosis.wording import (
     model_words,
     spelled,
 )
-from explorer.units import duration, enumeration, fixed, number, p_value, parameter_label, percent
+from explorer.units import code, duration, enumeration, fixed, number, p_value, parameter_label, percent
 
 OFFERS = {"scalars": "scalars", "profile": "scalars and height profiles", "scan": "scalars and scans of the surface"}
 
@@ -79,8 +80,13 @@ def _methods(result: DiagnosisResult) -> str:
     conditions = enumeration(
         [f"{row.condition} ({row.features} features, {_pours(result, row.condition)})" for row in result.offered]
     )
-    moved = enumeration([parameter_label(row.name) for row in result.parameters])
-    return (
+    calibrated = [row.name for row in result.parameters if effect_of(row.name) not in result.given]
+    moved = enumeration([parameter_label(name) for name in calibrated])
+    held = ""
+    if result.given:
+        named = enumeration([code(name) for name in result.given])
+        held = f"By an earlier diagnosis the declared model held {named}, calibrated within 60 % of what was found. "
+    return held + (
         f"The measured pours of {conditions} were compared with discrete-element simulations of the declared model, "
         f"alone and with each of {len(result.ranges)} candidate effects. Features of the pile were whitened by the "
         f"covariance of one simulated pour. A Bayesian linear regression on {result.pours.settings} simulated "

@@ -3,8 +3,9 @@
     python -m tests.doe.validation.second_round assets/validation 3 11 14 42 --store FILE
 
 Each set is diagnosed again (its pours are in the store, or made), with its follow-up where it had one; then the effect
-is given (`doe.declared.given`) and the others are asked about, with a follow-up of their own. Lines are appended to
-``second_round.jsonl``; sets that stand there are passed over. Half an hour for ten sets on two cores.
+is given (`doe.declared.given`) and the others are asked about, with a follow-up of their own (``--no-follow-up``: both
+without). Lines are appended to ``second_round.jsonl``; sets that stand there are passed over. Five minutes a set on two
+cores without follow-ups, ten with them.
 """
 
 import argparse

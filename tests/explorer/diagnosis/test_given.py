@@ -5,8 +5,12 @@ from dataclasses import replace
 
 import pytest
 
+from doe.declared.given import with_given
 from doe.declared.model import effect_values
+from doe.diagnose.result import CalibratedModel
 from doe.measurement import load_measurement
+from explorer.diagnosis.next_folder import write_next
+from explorer.diagnosis.piles import model_scene
 from explorer.diagnosis.run import NOTHING_BEFORE, earlier_answer
 from explorer.errors import CommandError
 from explorer.report.diagnosis import diagnosis_report
@@ -16,7 +20,7 @@ from explorer.report.markdown import document
 from solver import value
 from tests.explorer.command_line import explorer
 from tests.explorer.diagnosed import result_of_case, typed
-from tests.explorer.diagnosis.test_next_folder import SOURCE, fill
+from tests.explorer.diagnosis.test_next_folder import SOURCE, TWICE, fill, suggestion, values_of
 from tests.explorer.diagnosis.test_next_folder import written as write_next_folder
 
 
@@ -31,7 +35,7 @@ def test_what_an_answer_names_is_given_with_its_amplitudes(tmp_path, case):
     content = result_of_case(case)
     result = typed(content)
     row = result.effect_row(result.named[0])
-    given = earlier_answer(written(tmp_path / "first", content)).given
+    given = earlier_answer(written(tmp_path / "first", content), SOURCE).given
     assert list(given) == result.named[0].split("+")
     assert [x for amplitude in given.values() for x in amplitude] == [one.value for one in row.amplitudes]
 
@@ -41,7 +45,7 @@ def test_what_was_given_before_stays_as_it_was_calibrated(tmp_path):
     path = "effect.density_error.excess"
     known = content["parameters"][0] | {"name": path, "after": 0.17}
     content |= {"given": {"density_error": [0.2]}, "parameters": [*content["parameters"], known]}
-    given = earlier_answer(written(tmp_path / "second", content)).given
+    given = earlier_answer(written(tmp_path / "second", content), SOURCE).given
     assert given["density_error"] == (0.17,)
     assert len(given) == 2
 
@@ -50,7 +54,7 @@ def test_what_was_given_before_stays_as_it_was_calibrated(tmp_path):
 def test_an_answer_without_a_probable_effect_gives_none(tmp_path, case):
     folder = written(tmp_path / "first", result_of_case(case))
     with pytest.raises(CommandError, match=r"allowed: a diagnosis in which an effect has 90%"):
-        earlier_answer(folder)
+        earlier_answer(folder, SOURCE)
     refused = explorer("diagnose", "trefoil_1", "--given", str(tmp_path), "--out", str(tmp_path / "out"))
     assert refused.exit_code == 2
     assert "holds no diagnosis.json; allowed: a finished diagnosis" in refused.stderr
@@ -63,10 +67,11 @@ def test_what_was_measured_for_the_answer_before_is_joined(tmp_path):
     fill(asked)
     content = result_of_case("effect")
     content["order"]["follow_up"] = str(asked)
+    content["data"]["folder"] = str(SOURCE)
     first = written(tmp_path / "first", content)
     second = result_of_case("effect")
     second["order"]["given"] = str(first)
-    earlier = earlier_answer(written(tmp_path / "second", second))
+    earlier = earlier_answer(written(tmp_path / "second", second), SOURCE)
     carried = earlier.carried_into(measured)
     assert len(carried.fit) == len(measured.fit) + 1
     ((name, amplitude),) = earlier.given.items()
@@ -75,13 +80,56 @@ def test_what_was_measured_for_the_answer_before_is_joined(tmp_path):
     assert NOTHING_BEFORE.carried_into(measured) is measured
 
 
+def test_what_cannot_be_gone_on_from_is_refused(tmp_path):
+    content = result_of_case("effect")
+    content["order"]["follow_up"] = str(tmp_path / "next")
+    with pytest.raises(CommandError, match=r"has a follow-up of data/made up; allowed: of"):
+        earlier_answer(written(tmp_path / "other", content), SOURCE)
+    content = result_of_case("effect")
+    content["order"]["given"] = str(tmp_path / "round")
+    with pytest.raises(CommandError, match="goes on from itself"):
+        earlier_answer(written(tmp_path / "round", content), SOURCE)
+    first = written(tmp_path / "first", result_of_case("effect"))
+    refused = explorer("diagnose", "trefoil_1", "--given", str(first), "--out", str(first), "--resume")
+    assert (refused.exit_code, "is --out too" in refused.stderr) == (2, True)
+    (name,) = typed(result_of_case("effect")).named
+    out = tmp_path / "out"
+    refused = explorer("diagnose", "trefoil_1", "--given", str(first), "--effects", name, "--out", str(out))
+    assert (refused.exit_code, "all of them are in the model" in refused.stderr) == (2, True)
+    assert not out.exists()
+
+
+def test_a_further_follow_up_has_a_name_of_its_own_and_its_command_names_what_is_given(tmp_path):
+    measured = load_measurement(SOURCE)
+    one = suggestion(TWICE, values_of(measured, TWICE), measured.fit[0].name)
+    write_next(tmp_path / "first", SOURCE, measured, one)
+    (taken,) = (file.stem for file in (tmp_path / "first").glob("*.csv"))
+    write_next(tmp_path / "second", SOURCE, measured, one, tmp_path / "answer", (taken,))
+    (name,) = (file.stem for file in (tmp_path / "second").glob("*.csv"))
+    assert name != taken
+    assert f"--given {tmp_path / 'answer'}" in (tmp_path / "second" / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_piles_of_an_answer_have_what_was_given():
+    content = result_of_case("nothing")
+    content["data"]["folder"] = str(SOURCE)
+    measured = with_given(load_measurement(SOURCE), {"density_error": (0.2,)})
+    model = CalibratedModel(tuple(0.5 * (one.low + one.high) for one in measured.parameters))
+    for turned in (False, True):
+        condition = replace(measured.fit[0], turned=turned)
+        tilted = with_given(replace(measured, conditions=(condition,)), {"plate_tilt": (2.0, 0.0)})
+        scene = model_scene(tilted, tilted.fit[0], replace(model, theta=(*model.theta, 2.0, 0.0)))
+        assert value(scene, "effect.plate_tilt.tilt_x") == (-2.0 if turned else 2.0)
+        assert value(scene, "effect.density_error.excess") == pytest.approx(model.theta[-1])
+
+
 def test_the_report_says_what_was_in_the_model_and_how_it_is_asked():
     first = typed(result_of_case("effect"))
     assert f"--given {first.order.out}" in document(diagnosis_report(first))
     assert not verdict_sentence(first).startswith("The declared model holds")
     second = replace(first, given={"density_error": (0.2,)}, order=replace(first.order, given="results/first"))
     assert verdict_sentence(second).startswith(
-        "The declared model holds `density_error` here, as an earlier diagnosis found. The declared model lacks "
+        "The declared model holds `density_error` here, by an earlier diagnosis. The declared model lacks "
     )
     assert command(second).endswith("--given results/first")
     said = document(diagnosis_report(second))

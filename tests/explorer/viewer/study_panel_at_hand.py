@@ -99,6 +99,7 @@ class PanelAtHand:
             self.panel = StudyPanel(self.page)
         self.all_ranges, self.all_runs = handed["ranges_page"], handed["runs_page"]
         self.person = Person(folder, self.actions.carry_out)
+        self.early = Person(folder)  # what this one asks for waits until the test carries it out
         self.ranges = self.person.within("Ranges and target of the next study")
         self.profiler = self.person.within("Profiler")
         self.others = self.person.within("Other results")

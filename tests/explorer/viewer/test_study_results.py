@@ -23,7 +23,7 @@ def sliders(profiler):
 
 
 def stands_at(profiler):
-    """Where its sliders stand, in SI."""
+    """Where its sliders stand, in the units of the screen."""
     return [profiler.value(label) for label in sliders(profiler)]
 
 
@@ -83,6 +83,14 @@ def test_the_piles_of_the_study_that_is_shown_are_recorded(table, result, tmp_pa
     table.show()
     assert not table.person.sees("Recording")
     table.study.out = written(tmp_path / "study-1", result)
+    table.show()
+    # Pressed just before the study is gone from the page.
+    table.early.press(pile_recording.RECORD)
+    table.study.out = None
+    table.show()
+    assert "no finished study yet" in table.actions.carry_out()
+    assert not table.person.sees("Recording")
+    table.study.out = tmp_path / "study-1"
     table.show()
     table.person.press(pile_recording.RECORD)
     wait_for(lambda: ordered)
