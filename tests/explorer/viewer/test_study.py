@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from unittest import mock
 
 import plotly.io
 import pytest
@@ -35,6 +36,7 @@ from explorer.viewer.study.process_view import (
 )
 from explorer.viewer.study.study_panel import NONE
 from explorer.viewer.view import ThemeSwitch
+from solver import asset_path
 from solver.scenes.scene import value
 from tests.explorer.viewer.person import Person
 from tests.explorer.viewer.study_panel_at_hand import (
@@ -118,12 +120,15 @@ def test_a_browser_chooses_between_the_scheduler_of_the_server_and_this_machine(
     assert not PanelAtHand(server).person.sees("Pour on")
 
 
-def test_an_empty_page_says_what_to_do(table):
+def test_an_empty_page_says_what_to_do(server, tmp_path, monkeypatch):
+    sent = []  # also a chart that is hidden brings plotly.js to every browser
+    monkeypatch.setattr(server.gui, "add_plotly", lambda *_, **__: sent.append("plotly.js") or mock.Mock())
+    table = PanelAtHand(server, data=tmp_path / "data")
     board = table.board()
     assert (board["title"], board["charts"]) == ("", [])
     assert "No study is running" in table.person.text
     assert table.profiler.options("Chart") == (NOTHING,)
-    assert table.profiler.charts == []  # plotly.js is not sent for nothing
+    assert table.profiler.charts == sent == []
     assert "comes with the response surface" in table.profiler.text
     table.profiler.press("Set the live pour to these values")
     assert table.session.asked == []
@@ -361,8 +366,17 @@ def test_all_ranges_are_taken_from_a_table_or_none(table):
     assert "| X4 low | 40.1 MPa | 30 MPa |" in table.ranges.text
 
 
-def test_every_factor_has_a_row_and_what_is_shown_as_in_the_file_is_no_change(table):
+def test_every_factor_has_a_row_and_what_is_shown_as_in_the_file_is_no_change(server, tmp_path, monkeypatch):
+    # Numbers of more digits than a box shows.
+    text = asset_path("studies", "sunflower_extract").read_text(encoding="utf-8")
+    for short, long in (('low = "40.1MPa"', 'low = "40.1000123MPa"'), ("mean = 24.68 ", "mean = 24.6800123 ")):
+        assert text.count(short) == 1
+        text = text.replace(short, long)
+    (tmp_path / "long.toml").write_text(text, encoding="utf-8")
+    monkeypatch.setattr(FakeStudy, "study_file", tmp_path / "long.toml")
+    table = PanelAtHand(server)
     ranges = table.ranges
+    assert (ranges.value(X4)[0], ranges.value(TARGET)) == (40.1, 24.68)
     rows = factor_labels(ranges)
     assert len(rows) == len(load_study(str(table.study.study_file)).factors)
     for label in (*rows, TARGET):
