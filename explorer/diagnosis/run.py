@@ -105,11 +105,22 @@ class Earlier:
     given: Given
     follow_ups: tuple[Measurement, ...] = ()
 
-    def carried_into(self, measurement: Measurement) -> Measurement:
-        """``measurement`` with the follow-ups among its fitted conditions, and the effects in its model."""
+    def carried_into(
+        self, measurement: Measurement, follow_up: Measurement | None
+    ) -> tuple[Measurement, Measurement | None]:
+        """``measurement`` with the earlier follow-ups among its fitted conditions, and the effects in its model.
+
+        A new ``follow_up`` has them in its model too, within the same ranges: those that the rigs of both allow.
+        """
         for one in self.follow_ups:
             measurement = joined(measurement, one)
-        return with_given(measurement, self.given)
+        if follow_up is None or not self.given:
+            return with_given(measurement, self.given), follow_up
+        both = with_given(joined(measurement, follow_up), self.given)
+        known = {one.name for one in measurement.conditions}
+        old = tuple(one for one in both.conditions if one.name in known)
+        new = tuple(one for one in both.conditions if one.name not in known)
+        return replace(both, conditions=old), replace(follow_up, parameters=both.parameters, conditions=new)
 
 
 NOTHING_BEFORE = Earlier({})
@@ -159,8 +170,7 @@ def _run(
     """Pour, judge and write into ``order.out``, which is there and this command's alone."""
     say, names = reporter.say, order.effects or tuple(EFFECTS)
     path, as_declared = order.store or default_store(), measurement
-    measurement = earlier.carried_into(measurement)
-    follow_up = None if follow_up is None else with_given(follow_up, earlier.given)
+    measurement, follow_up = earlier.carried_into(measurement, follow_up)
     budget = Budget()
     if order.budget is not None:
         budget = scaled_budget(order.budget, measurement, names)

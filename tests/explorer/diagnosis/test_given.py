@@ -6,18 +6,20 @@ from dataclasses import replace
 import pytest
 
 from doe.declared.given import with_given
-from doe.declared.model import effect_values
+from doe.declared.model import effect_values, possible
+from doe.diagnose.diagnosis import joined
 from doe.diagnose.result import CalibratedModel
 from doe.measurement import load_measurement
 from explorer.diagnosis.next_folder import write_next
 from explorer.diagnosis.piles import model_scene
-from explorer.diagnosis.run import NOTHING_BEFORE, earlier_answer
+from explorer.diagnosis.run import NOTHING_BEFORE, Earlier, earlier_answer
 from explorer.errors import CommandError
 from explorer.report.diagnosis import diagnosis_report
 from explorer.report.diagnosis.answer import verdict_sentence
 from explorer.report.diagnosis.method import command
 from explorer.report.markdown import document
-from solver import value
+from solver import value, with_values
+from solver.assets import measurement_folder
 from tests.explorer.command_line import explorer
 from tests.explorer.diagnosed import result_of_case, typed
 from tests.explorer.diagnosis.test_next_folder import SOURCE, TWICE, fill, suggestion, values_of
@@ -72,12 +74,51 @@ def test_what_was_measured_for_the_answer_before_is_joined(tmp_path):
     second = result_of_case("effect")
     second["order"]["given"] = str(first)
     earlier = earlier_answer(written(tmp_path / "second", second), SOURCE)
-    carried = earlier.carried_into(measured)
+    carried, _ = earlier.carried_into(measured, None)
     assert len(carried.fit) == len(measured.fit) + 1
     ((name, amplitude),) = earlier.given.items()
     path = next(iter(effect_values(name, amplitude)))
     assert all(value(one.scene, path) > 0.0 for one in carried.conditions)
-    assert NOTHING_BEFORE.carried_into(measured) is measured
+    alone, beside = NOTHING_BEFORE.carried_into(measured, carried)
+    assert alone is measured
+    assert beside is carried
+
+
+def test_the_follow_ups_of_a_chain_come_in_their_order(tmp_path):
+    """Each in the set-up that was asked for by the answer before it: names are given in that order."""
+    measured, folder = load_measurement(SOURCE), None
+    for number, change in enumerate((TWICE, "half the mass", "fed four times as fast")):
+        asked = fill(write_next_folder(tmp_path / f"next {number}", SOURCE, measured, change))
+        content = result_of_case("effect")
+        content["order"] |= {"follow_up": str(asked), "given": str(folder) if folder else None}
+        content["data"]["folder"] = str(SOURCE)
+        folder = written(tmp_path / str(number), content)
+    earlier = earlier_answer(folder, SOURCE)
+    assert [str(one.folder.name) for one in earlier.follow_ups] == ["next 0", "next 1", "next 2"]
+    carried, _ = earlier.carried_into(measured, None)
+    heights = [value(one.scene, "rig.outlet_height") for one in carried.fit[len(measured.fit) :]]
+    masses = [value(one.scene, "rig.mass") for one in carried.fit[len(measured.fit) :]]
+    first = measured.fit[0].scene
+    assert heights == [pytest.approx(k * value(first, "rig.outlet_height")) for k in (2.0, 1.0, 1.0)]
+    assert masses == [pytest.approx(k * value(first, "rig.mass")) for k in (1.0, 0.5, 1.0)]
+
+
+def test_a_follow_up_has_what_is_given_within_the_range_of_all_conditions():
+    """A narrow outlet, which only one condition of the data has, draws scattered sizes in."""
+    measured = load_measurement(measurement_folder("sunflower_extract"))
+    (wide, *_) = measured.fit
+    outlet = "rig.outlet_diameter"
+    narrow = with_values(wide.scene, {outlet: 0.6 * value(wide.scene, outlet)})
+    both = replace(measured, conditions=(wide, replace(wide, name="narrow", scene=narrow)))
+    follow_up = replace(measured, conditions=(replace(wide, name="once more"),))
+    amplitudes = {"size_dispersion": (0.1,), "density_error": (0.2,)}
+    data, more = Earlier(amplitudes).carried_into(both, follow_up)
+    assert [one.name for one in joined(data, more).conditions] == [wide.name, "narrow", "once more"]
+    sizes = next(one for one in more.parameters if one.path.startswith("effect.size_dispersion."))
+    assert sizes.high < 0.1
+    for one in joined(data, more).conditions:
+        assert possible(one.scene, "size_dispersion", (sizes.high,))
+        assert value(one.scene, "effect.density_error.excess") > 0.0
 
 
 def test_what_cannot_be_gone_on_from_is_refused(tmp_path):
