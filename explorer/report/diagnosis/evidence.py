@@ -314,8 +314,7 @@ def strained(result: DiagnosisResult) -> list[str]:
     """A sentence for every parameter that the fit drives to an end of its range or far from its measured mean."""
     found = []
     for row in result.parameters:
-        if effect_of(row.name) in result.given:  # its range is about an earlier answer, and nobody measured it
-            continue
+        given = effect_of(row.name) in result.given
         models = ((BASE, row.before), (result.final, row.after))
         for model, value in models if result.added else models[:1]:
             where = ""
@@ -324,9 +323,14 @@ def strained(result: DiagnosisResult) -> list[str]:
             elif row.mean is not None and row.sd is not None and abs(value - row.mean) > FAR_OFF * row.sd:
                 where = f"{fixed(abs(value - row.mean) / row.sd, 1)} standard deviations from its measurement"
             if where:
+                # Nobody measured what is given: its range is about an earlier answer.
+                so = (
+                    "Its range is about an earlier answer; there may be less of it, or more, than that."
+                    if given
+                    else "If the measurement is right, that is evidence against this model."
+                )
                 found.append(
                     f"To fit, {model_words(model)} needs {parameter_label(row.name)} ({code(row.name)}) {where}, "
-                    f"{parameter_value(row.name, value)}. If the measurement is right, that is evidence against "
-                    "this model."
+                    f"{parameter_value(row.name, value)}. {so}"
                 )
     return found

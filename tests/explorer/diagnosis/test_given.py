@@ -10,18 +10,21 @@ from doe.declared.model import effect_values, possible
 from doe.diagnose.diagnosis import joined
 from doe.diagnose.result import CalibratedModel
 from doe.measurement import load_measurement
+from explorer import load_diagnosis
+from explorer.diagnosis import run
 from explorer.diagnosis.next_folder import write_next
 from explorer.diagnosis.piles import model_scene
 from explorer.diagnosis.run import NOTHING_BEFORE, Earlier, earlier_answer
 from explorer.errors import CommandError
 from explorer.report.diagnosis import diagnosis_report
 from explorer.report.diagnosis.answer import verdict_sentence
+from explorer.report.diagnosis.evidence import strained
 from explorer.report.diagnosis.method import command
 from explorer.report.markdown import document
 from solver import value, with_values
 from solver.assets import measurement_folder
 from tests.explorer.command_line import explorer
-from tests.explorer.diagnosed import result_of_case, typed
+from tests.explorer.diagnosed import CASES, diagnosed, result_of_case, typed
 from tests.explorer.diagnosis.test_next_folder import SOURCE, TWICE, fill, suggestion, values_of
 from tests.explorer.diagnosis.test_next_folder import written as write_next_folder
 
@@ -176,3 +179,62 @@ def test_the_report_says_what_was_in_the_model_and_how_it_is_asked():
     said = document(diagnosis_report(second))
     assert "In the model already" in said
     assert "`density_error`, excess 0.2; calibrated with the other parameters about that" in said
+
+
+def test_a_given_amplitude_at_an_end_of_its_range_is_told_without_a_measurement():
+    content = result_of_case("nothing")
+    path = "effect.density_error.excess"
+    known = content["parameters"][0] | {"name": path, "low": 0.08, "high": 0.3, "mean": None, "sd": None}
+    known |= {"before": 0.3, "after": 0.3}
+    content |= {"given": {"density_error": [0.2]}, "parameters": [*content["parameters"], known]}
+    (line,) = strained(typed(content))
+    assert "at the upper end of its range" in line
+    assert "Its range is about an earlier answer" in line
+    assert "If the measurement is right" not in line
+    content["parameters"][-1] |= {"before": 0.2, "after": 0.2}
+    assert strained(typed(content)) == []
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Calls of the loop that pours, which has the answer of a case ready, made from the data that it is asked about."""
+    calls = []
+
+    def run_diagnosis(measurement, store, pours, effects, budget, stage, on_pour, seed, follow_up):
+        calls.append((measurement, effects, follow_up))
+        return diagnosed(**CASES["ambiguous"])[1]
+
+    monkeypatch.setattr(run, "run_diagnosis", run_diagnosis)
+    return calls
+
+
+def test_a_diagnosis_goes_on_from_another_one_to_its_files(tmp_path, asked):
+    """By the command: what the loop is asked, what the files say, and what the folder of the follow-up asks for."""
+    first = result_of_case("effect")
+    first["data"]["folder"] = str(SOURCE)
+    first = written(tmp_path / "first", first)
+    out, store = tmp_path / "second", ("--store", str(tmp_path / "pours.sqlite"))
+    done = explorer("diagnose", str(SOURCE), "--given", str(first), "--out", str(out), *store)
+    assert done.exit_code == 0, done.stderr
+    ((measurement, _, follow_up),) = asked
+    path = "effect.adhesion_sjkr.cohesion_energy_density"
+    sizes = {value(one.scene, path) for one in measurement.conditions}
+    assert (len(sizes), follow_up) == (1, None)
+    (size,) = sizes
+    assert measurement.parameters[-1].low < size < measurement.parameters[-1].high
+    result = load_diagnosis(out)
+    assert result.given == {"adhesion_sjkr": (size,)}
+    assert result.order.given == str(first)
+    assert "The declared model holds `adhesion_sjkr` here" in (out / "report.md").read_text(encoding="utf-8")
+    assert f"--given {first}" in (out / "next/README.md").read_text(encoding="utf-8")
+
+    (out / "next").rename(tmp_path / "next")
+    fill(tmp_path / "next")
+    last = tmp_path / "last"
+    words = ("--given", str(first), "--follow-up", str(tmp_path / "next"), "--out", str(last))
+    done = explorer("diagnose", str(SOURCE), *words, *store)
+    assert done.exit_code == 0, done.stderr
+    again, _, follow_up = asked[-1]
+    assert again.parameters == follow_up.parameters == measurement.parameters
+    assert [value(one.scene, path) for one in follow_up.conditions] == [size]
+    assert load_diagnosis(last).order.follow_up == str(tmp_path / "next")
