@@ -26,8 +26,27 @@ def test_errors_by_hand():
     assert (rows[0].before, rows[0].after) == (pytest.approx(3.0), pytest.approx(0.0))
     assert rows[0].noise_floor == pytest.approx(np.sqrt(2))
     assert rows[0].skill == pytest.approx(1 - (0 - 2) / (9 - 2))
-    # Overall: in measured standard deviations of sqrt(2).
+    # Overall: in standard deviations of a pour, here sqrt(2) on both sides.
     assert rows[1].before == pytest.approx(3 / np.sqrt(2))
+
+
+def test_the_standard_deviation_of_a_pour_is_pooled():
+    """By hand: squares 2 of two measured pours and 0 of two simulated ones, two degrees of freedom: s = 1."""
+    measured, constant = np.array([[1.0], [3.0]]), np.array([[4.0], [4.0]])
+    row = holdout_errors([HoldoutCondition("c", ("x",), measured, measured, constant)])[-1]
+    assert row.after == pytest.approx(2.0)
+    assert row.noise_floor == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("n", "m"), [(3, 8), (6, 8), (6, 32)])
+def test_few_pours_do_not_make_a_right_model_look_wrong(n, m):
+    """E[t^2] = f/(f - 2) with f = n + m - 2, for a mean square over normal observables; by s_meas f would be n - 1."""
+    names = tuple(f"x{k}" for k in range(11))
+    data = [condition(0.0, 0.0, seed, n, m, names, np.ones(11)) for seed in range(200)]
+    ratios = [holdout_errors([one], samples=2)[-1].ratio for one in data]
+    f = n + m - 2
+    # 2200 values of t^2 with a standard deviation of about 2 leave 0.05; the floor's own scatter adds as much.
+    assert np.mean(np.square(ratios)) == pytest.approx(f / (f - 2), abs=0.15)
 
 
 def test_observables_join_over_conditions():
@@ -48,8 +67,8 @@ def test_skill_of_a_model_that_is_right_half_right_and_unchanged(bias, skill):
 
 def test_a_right_model_is_at_the_noise_floor_and_covers():
     found = [holdout_errors([condition(3.0, 0.0, seed)], samples=200, seed=seed)[-1] for seed in range(100)]
-    # Mean of after^2/noise^2 is one; the floor itself is estimated from 7 and 19 df.
-    assert np.mean([row.ratio**2 for row in found]) == pytest.approx(1.0, abs=0.35)
+    # Mean of after^2/noise^2 is f/(f - 2) with 26 df. 200 values of t^2 leave 0.11.
+    assert np.mean([row.ratio**2 for row in found]) == pytest.approx(26 / 24, abs=0.3)
     # 1600 measured pours, in groups that share their simulated mean.
     assert np.mean([row.coverage_after for row in found]) == pytest.approx(0.90, abs=0.03)
     assert np.mean([row.coverage_before for row in found]) < 0.25

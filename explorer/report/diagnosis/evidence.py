@@ -105,7 +105,7 @@ def _error_row(result: DiagnosisResult, row: ErrorRow) -> tuple[str, ...]:
     known = result.added and math.isfinite(row.skill_low)
     interval = f"{fixed(row.skill_low)} … {fixed(row.skill_high)}" if known else MISSING
     return (
-        feature_label(name) + (" (in measured SD)" if name == OVERALL else ""),
+        feature_label(name) + (" (in SD of a pour)" if name == OVERALL else ""),
         *(feature_value(result, name, one) for one in (row.before, row.after, row.noise_floor)),
         fixed(row.ratio),
         fixed(row.skill) if result.added else MISSING,

@@ -157,9 +157,9 @@ def feature_label(name: str) -> str:
 
 
 def feature_unit(result: DiagnosisResult, name: str) -> ReadingUnit:
-    """Unit in which a feature is read; for all together each one's measured standard deviation."""
+    """Unit in which a feature is read; for all together the standard deviation of a pour in each."""
     if name == OVERALL:
-        return ReadingUnit("measured SD", 1.0)
+        return ReadingUnit("SD", 1.0)
     plain = name.partition("@")[0]
     if plain in SURFACE_LABELS:
         return next((unit for ending, unit in SURFACE_UNITS.items() if plain.endswith(ending)), ReadingUnit("", 1.0))
