@@ -8,9 +8,9 @@ a pour first,
     s^2 = ((n - 1) s_meas^2 + (m - 1) s_after^2)/(n + m - 2)
 
 pooled over the n measured pours and the m simulated ones of the final model: s_meas of a few pours is small by chance
-somewhere, and that observable would then make most of the sum. With n = 3, m = 8 and eleven normal observables a perfect
-model shows 1.5 times the floor (root mean square) by s_meas, 1.15 times by s. Predictions are fresh simulations, never
-the emulator.
+somewhere, and that observable would then make most of the sum. With n = 3, m = 8 and eleven normal observables a
+perfect model shows 1.5 times the floor (root mean square) by s_meas, 1.15 times by s. Predictions are fresh
+simulations, never the emulator.
 """
 
 from __future__ import annotations

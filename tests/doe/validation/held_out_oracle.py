@@ -1,31 +1,33 @@
 """What the held-out error would be over its noise floor if name, amplitudes and parameters were known exactly.
 
-    python -m tests.doe.validation.held_out_oracle --number 74
+    python -m tests.doe.validation.held_out_oracle --number 74 --answers assets/validation/sets.jsonl
 
 The truth of each set with one effect is poured as a diagnosis pours its final model: the same numbers of measured and
-of fresh pours, in the same held-out conditions, compared by the same code. As both are of one population, any division
-of them is as good as the one that happened: ``DIVISIONS`` of them tell the ratio's distribution. No method does better
-than this on average; what a diagnosis shows beyond it is the error of its fit.
+of fresh pours by the same seeds, in the same held-out conditions, compared by the same code. As both are of one
+population, any division of them is as good as the one that happened: ``DIVISIONS`` of them tell the ratio's
+distribution. No method does better than this on average. What right names show beyond their own truths, with the same
+measured pours and the same seeds, is the error of their fits.
 """
 
 import argparse
 import contextlib
-import json
+import math
 import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from doe.declared.points import Point
 from doe.diagnose.budget import Budget
+from doe.diagnose.confirm import confirming
 from doe.diagnose.diagnosis import complete_rows, fresh_pours
+from doe.diagnose.result import CalibratedModel
 from doe.holdout import HoldoutCondition, holdout_errors
 from doe.measurement import load_measurement, summary_names
 from doe.store import Store, default_store
 from doe.validation.campaign import Answers, CampaignOrder, measured_strengths
 from doe.validation.laboratory import read_laboratory
-from doe.validation.sets import HOLDOUT_GOOD
+from doe.validation.sets import HOLDOUT_GOOD, read_rows
 from doe.validation.truth import truth_of
 from doe.validation.work_place import WorkPlace
 
@@ -62,8 +64,7 @@ def ratios(answers, case, generator):
     measured = answers.measured(truth, held)
     fresh = fresh_pours(answers.measurement.conditions)
     pours = answers.model_pours(held)
-    points = [Point("oracle", k, truth.theta, truth.effects) for k in range(fresh)]
-    poured = pours.run("oracle", points)
+    poured = pours.run("oracle", confirming(CalibratedModel(truth.theta, truth.effects), fresh))
     if measured is None or not all(pour.valid for row in poured for pour in row):
         return None
     rows = [
@@ -75,15 +76,31 @@ def ratios(answers, case, generator):
     return ratio(rows), [ratio(rows, generator) for _ in range(DIVISIONS)]
 
 
+def paired(path, root, own):
+    """By kind of data: ratios of right names, and those of the truths of the same sets."""
+    found = {}
+    for row in read_rows(path) if path else []:
+        if row.root == root and row.number in own and math.isfinite(row.after):
+            found.setdefault(row.offer, []).append((row.after, own[row.number]))
+    return {offer: np.array(pairs).T for offer, pairs in found.items()}
+
+
+def told(ratios):
+    """Sets, median, and share up to ``HOLDOUT_GOOD``."""
+    good = float(np.mean(np.asarray(ratios) <= HOLDOUT_GOOD))
+    return f"{len(ratios)}, median {np.median(ratios):.2f}, up to {HOLDOUT_GOOD:g}: {good:.0%}"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--root", type=int, default=1)
     parser.add_argument("--number", type=int, default=74)
     parser.add_argument("--store", type=Path)
+    parser.add_argument("--answers", type=Path, help="rows of these sets, whose right names are compared")
     asked = parser.parse_args()
     order = CampaignOrder(Path(), asked.number, asked.root, asked.store)
     laboratory = read_laboratory(order.laboratory)
-    own, divided, generator = [], [], np.random.default_rng(asked.root)
+    own, divided, generator = {}, [], np.random.default_rng(asked.root)
     with contextlib.ExitStack() as stack:
         store = Store(order.store or default_store())
         stack.callback(store.close)
@@ -92,12 +109,14 @@ def main():
         for case in order.asked(laboratory):
             if case.kind != "effect" or (found := ratios(answers, case, generator)) is None:
                 continue
-            own.append(found[0])
+            own[case.number] = found[0]
             divided += found[1]
             print(f"{case.number}: {found[0]:.2f}, divided otherwise {np.median(found[1]):.2f}", flush=True)
-    good = float(np.mean(np.array(divided) <= HOLDOUT_GOOD))
-    told = {"sets": len(own), "median": np.median(own), "divided: median": np.median(divided), "share good": good}
-    print(json.dumps({key: round(float(value), 3) for key, value in told.items()}))
+    print(f"truths as they were poured: {told(list(own.values()))}")
+    print(f"divided otherwise: {told(divided)}")
+    for offer, (names, truths) in paired(asked.answers, asked.root, own).items():
+        print(f"right names by {offer}: {told(names)}; the truths of these sets: {told(truths)}")
+        print(f"    mean of the squares' difference {np.mean(names**2 - truths**2):.2f}")
 
 
 if __name__ == "__main__":
