@@ -17,7 +17,7 @@ from explorer.diagnosis.piles import model_scene
 from explorer.diagnosis.run import NOTHING_BEFORE, Earlier, earlier_answer
 from explorer.errors import CommandError
 from explorer.report.diagnosis import diagnosis_report
-from explorer.report.diagnosis.answer import verdict_sentence
+from explorer.report.diagnosis.answer import cautions, verdict_sentence
 from explorer.report.diagnosis.evidence import strained
 from explorer.report.diagnosis.method import command
 from explorer.report.markdown import document
@@ -179,6 +179,22 @@ def test_the_report_says_what_was_in_the_model_and_how_it_is_asked():
     said = document(diagnosis_report(second))
     assert "In the model already" in said
     assert "`density_error`, excess 0.2; calibrated with the other parameters about that" in said
+
+
+def with_p(case, p):
+    content = result_of_case(case)
+    for row in content["effects"]:
+        row["p"] = p
+    return cautions(typed(content))
+
+
+def test_a_name_that_fits_loosely_may_not_be_alone():
+    """It is said of one effect whose p is below 0.3, and of no other answer."""
+    assert not any("asks whether it is alone" in text for text in with_p("effect", 0.31))
+    (said,) = (text for text in with_p("effect", 0.29) if "asks whether it is alone" in text)
+    assert "come up in 29 % of cases" in said
+    for case in ("pair", "ambiguous", "nothing"):
+        assert not any("asks whether it is alone" in text for text in with_p(case, 0.02))
 
 
 def test_a_given_amplitude_at_an_end_of_its_range_is_told_without_a_measurement():

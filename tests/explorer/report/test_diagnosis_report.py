@@ -388,20 +388,6 @@ def test_an_amplitude_that_is_cut_and_a_wide_scatter_are_called_so(results):
     assert "the largest that was considered" in verdict_sentence(result)
 
 
-def test_a_name_that_fits_loosely_may_not_be_alone(results):
-    """It is said of one effect whose p is below 0.3, and of no other answer."""
-    result = copy.deepcopy(results["effect"])
-    for p, said in ((0.31, False), (0.29, True)):
-        result["effects"][0]["p"] = p
-        assert any("asks whether it is alone" in text for text in cautions(result)) == said
-    assert any("come up in 29 % of cases" in text for text in cautions(result))
-    for case in ("pair", "ambiguous", "nothing"):
-        other = copy.deepcopy(results[case])
-        for row in other["effects"]:
-            row["p"] = 0.02
-        assert not any("asks whether it is alone" in text for text in cautions(other))
-
-
 def test_a_parameter_far_from_its_measurement_is_called_so(results):
     result = copy.deepcopy(results["effect"])
     assert strained(result) == []
