@@ -24,6 +24,7 @@ import numpy.typing as npt
 from scipy import stats
 
 from doe.errors import StatisticsError
+from doe.measurement.residual_map import pooled_deviation
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
@@ -100,7 +101,7 @@ class _Entry:
         measured, before, after = (
             values[:, column] for values in (condition.measured, condition.before, condition.after)
         )
-        unit = _pooled_deviation(measured, after) or 1.0
+        unit = float(pooled_deviation(measured, after)) or 1.0
         draws = [
             values[generator.integers(0, len(values), size=(samples, len(values)))].mean(axis=1)
             for values in (measured, before, after)
@@ -157,12 +158,6 @@ def _error(observable: str, entries: Sequence[_Entry], unit: FloatArray) -> Hold
 def _skill(before: float, after: float) -> float:
     """Return 1 - after/before of squared errors freed from noise; NaN where nothing is left before."""
     return 1 - after / before if before > 0 else math.nan
-
-
-def _pooled_deviation(one: FloatArray, other: FloatArray) -> float:
-    """Return the standard deviation within both samples."""
-    square = float(((one - one.mean()) ** 2).sum() + ((other - other.mean()) ** 2).sum())
-    return math.sqrt(square / (len(one) + len(other) - 2))
 
 
 def _square_error(values: FloatArray) -> float:

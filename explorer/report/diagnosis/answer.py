@@ -73,7 +73,7 @@ def _what_next(result: DiagnosisResult) -> str:
             return (
                 f"Pour the corrected material, and calibrate it with its study: `{CORRECTED}` and "
                 f"`{CORRECTED_STUDY}`, which `explorer diagnose … --apply` writes beside this report. What else is "
-                f"missing beside it, `explorer diagnose … --given {result.order.out}` asks."
+                f"missing beside it, {_asking_further(result)} asks."
             )
         case "ambiguous":
             return f"{_asked_for(result)} `explorer diagnose … --follow-up` takes them."
@@ -82,12 +82,17 @@ def _what_next(result: DiagnosisResult) -> str:
             if result.handed_on():
                 further = (
                     " Two effects at once look like one that comes near: what is missing beside it, "
-                    f"`explorer diagnose … --given {result.order.out}` asks."
+                    f"{_asking_further(result)} asks."
                 )
             return (
                 "Pour the same set-up again, and check scale, units and the set-up before looking for new physics."
                 + further
             )
+
+
+def _asking_further(result: DiagnosisResult) -> str:
+    """The command that asks what else is missing."""
+    return f"`explorer diagnose … --given {result.order.out}`"
 
 
 def in_short(result: DiagnosisResult) -> Section:
@@ -205,7 +210,7 @@ def cautions(result: DiagnosisResult) -> list[str]:
         found.append(
             f"Data as far off {spelled(final.name)} as these come up in {percent(final.p)} of cases if nothing else is "
             "missing. That is no contradiction, but the stronger one of two effects shows like this: "
-            f"`explorer diagnose … --given {result.order.out}` asks whether it is alone."
+            f"{_asking_further(result)} asks whether it is alone."
         )
     if result.scatter > WIDE:
         found.append(

@@ -5,7 +5,7 @@
 Each set is diagnosed again (its pours are in the store, or made), with its follow-up where it had one; then the effect
 is given (`doe.declared.given`) and the others are asked about, with a follow-up of their own (``--no-follow-up``: both
 without). Lines are appended to ``second_round.jsonl``; sets that stand there are passed over. Five minutes a set on two
-cores without follow-ups, ten with them.
+cores without follow-ups, ten to twenty with them.
 """
 
 import argparse
