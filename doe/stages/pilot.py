@@ -42,6 +42,9 @@ from doe.studies.profile import Profile
 from doe.studies.study import CALIBRATED, Study
 from doe.target import experiment_of, is_angle
 
+REFERENCE = "reference"
+"""Label of the setting that nothing is changed in."""
+
 
 @dataclass(frozen=True)
 class StageSize(Record):
@@ -112,7 +115,7 @@ class PilotStage(Stage):
 
 def pilot(study: Study, profile: Profile, runner: Runner, bias: Bias) -> PilotResult:
     """Run the reference setting and the declared changes, choose the estimator and size the study."""
-    settings = [Setting("reference", {}, profile.pilot_runs, study.all_experiments)]
+    settings = [Setting(REFERENCE, {}, profile.pilot_runs, study.all_experiments)]
     settings += [Setting(name, values, profile.change_runs) for name, values in study.changes.items()]
     rows = runner.run("pilot", settings)
     target = study.targets[0].observable
@@ -120,7 +123,7 @@ def pilot(study: Study, profile: Profile, runner: Runner, bias: Bias) -> PilotRe
         setting.label: {e: responses([runs], e)[0] for e in study.estimators if experiment_of(e) in setting.experiments}
         for setting, runs in zip(settings, rows, strict=True)
     }
-    noise = {e: replicate_noise(values) for e, values in tables["reference"].items()}
+    noise = {e: replicate_noise(values) for e, values in tables[REFERENCE].items()}
     notes: list[str] = []
     choice = _choice(tables, target, bias, notes) if study.changes else None
     estimator = target if choice is None else choice.chosen
@@ -171,9 +174,9 @@ def _choice(
     tables: Mapping[str, Mapping[str, FloatArray]], target: str, bias: Bias, notes: list[str]
 ) -> EstimatorChoice | None:
     """The choice among the estimators of the target's kind (an angle, or not); None where none can be made."""
-    candidates = [e for e in tables["reference"] if is_angle(e) == is_angle(target) and not experiment_of(e)]
+    candidates = [e for e in tables[REFERENCE] if is_angle(e) == is_angle(target) and not experiment_of(e)]
     groups = {name: {e: table[e] for e in candidates} for name, table in tables.items()}
-    centre = groups.pop("reference")
+    centre = groups.pop(REFERENCE)
     readings = {e: [mean for mean, _ in found] for e, found in bias.items()}
     try:
         return choose_estimator(centre, groups, default=target, bias=readings, bias_limit=BIAS_LIMIT_DEG)

@@ -11,7 +11,7 @@ from doe.provenance import About, PouredPile, SetUp
 from doe.record import Document, Record
 from doe.run_records import Run, Setting
 from doe.stages.ascent import AscentResult
-from doe.stages.pilot import PilotResult
+from doe.stages.pilot import REFERENCE, PilotResult
 from doe.stages.reach import ReachResult
 from doe.stages.scan import ScanResult
 from doe.stages.screening import ScreeningResult
@@ -126,6 +126,10 @@ class Stages(Record):
     def own_runs_of(self, stage: str) -> tuple[Run, ...]:
         """Return the runs of a stage in the study's own rig."""
         return tuple(run for runs in self.runs_of(stage) for run in runs if not run.experiment)
+
+    def reference_runs(self) -> tuple[Run, ...]:
+        """Return the pilot's runs at the reference setting in the study's own rig."""
+        return tuple(run for run in self.own_runs_of("pilot") if run.label == REFERENCE)
 
     def settings_of(self, stage: str) -> tuple[Setting, ...]:
         """Return the settings of a stage, in the order of ``runs_of``; empty also of results of older versions."""

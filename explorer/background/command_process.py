@@ -1,7 +1,7 @@
 """A command of the command line in a process of its own, and the orders that wait for it.
 
 It has lower priority, so that the live pour stays smooth. The command writes ``progress.jsonl`` into its output folder,
-one `explorer.background.progress.ProgressEvent` per line, which is all that is read here.
+one `explorer.background.events.ProgressEvent` per line, which is all that is read here.
 
 The next order begins when the one before has come to its end: a report or a failure. A command that was cancelled
 leaves the line waiting for the next start, because who cancels wants quiet.
@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Any, Generic, Literal, TypeVar
 
-from explorer.background.progress import PROGRESS, ProgressEvent, StageProgress, TriedRun, with_event, with_run
+from explorer.background.events import PROGRESS, ProgressEvent, StageProgress, TriedRun, with_event, with_run
 from explorer.errors import CommandError
 from explorer.priority import BACKGROUND, lowered, session_gives_way
 

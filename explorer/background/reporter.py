@@ -1,6 +1,6 @@
 """What a long command tells while it runs: lines to a person, events to the page and to CI, and a log.
 
-There is one stream of events (`explorer.background.progress.ProgressEvent`, one JSON object per line): the page reads
+There is one stream of events (`explorer.background.events.ProgressEvent`, one JSON object per line): the page reads
 it from ``progress.jsonl`` in the output folder, CI from standard output (``--json``). The log is that of the standard
 library: the packages log by ``logging.getLogger(__name__)``, and while a command runs its records are JSON lines in
 ``log.jsonl`` of the output folder:
@@ -29,7 +29,8 @@ from typing import IO, Self
 
 from doe.errors import StudyStopped
 from doe.pour_runner import Pours
-from explorer.background.progress import PROGRESS, Bar, Ending, ProgressEvent
+from explorer.background.bar import Bar
+from explorer.background.events import PROGRESS, Ending, ProgressEvent
 from explorer.files.output_file import write_whole
 from explorer.scene.text import material_toml
 from solver import Job, PourBrokeOff, Record, Scene

@@ -96,18 +96,15 @@ def design(
     from explorer.design.run_plan import DesignOrder, make_plan, sheet_content
     from explorer.design.text import check_power, plan_result, plan_text
     from explorer.errors import CommandError
-    from explorer.files.output_file import write_whole_bytes
-    from explorer.files.run_folder import appearing, check_vacant, json_text
+    from explorer.files.output_file import check_new_file, check_vacant, write_whole_bytes
+    from explorer.files.run_folder import appearing, json_text
     from explorer.files.run_result import made_today
     from solver.assets import asset_path
 
-    if out.exists():
-        raise CommandError(f"--out {out}: is there already; name a new file")
+    check_new_file(out, option="--out")
     workbook = out.suffix.lower() == WORKBOOK
     if workbook and decimal_comma:
         raise CommandError(f"--decimal-comma: {out} is a workbook, which shows numbers as its reader has them")
-    if not out.absolute().parent.is_dir():
-        raise CommandError(f"--out {out}: no folder {out.absolute().parent}")
     if report is not None:
         check_vacant(report, "--report")
     check_power(sigma, effect)
@@ -134,7 +131,8 @@ def design(
     said = json_text(plan_result(plan, file, sigma, effect)) if json else plan_text(plan, file, sigma, effect)
     write_whole_bytes(out, sheet_content(plan, file, workbook, decimal_comma))
     if report is not None:
-        from explorer.report.design.plan import design_plan, plan_report
+        from explorer.design.plan_result import design_plan
+        from explorer.report.design.plan import plan_report
         from explorer.report.folder import write_report
 
         made = design_plan(plan, file, sigma, effect, made_today(author, notes))

@@ -51,7 +51,8 @@ def measure(
     """
     from doe.studies.study import load_study
     from explorer.errors import CommandError
-    from explorer.files.run_folder import appearing, check_vacant, json_text
+    from explorer.files.output_file import check_vacant
+    from explorer.files.run_folder import appearing, json_text
     from explorer.photograph.run import measure_order, run_measure
     from explorer.photograph.target import check_targets, keep_target, write_into_study
     from explorer.tables.photograph import measure_result, measure_text, refusal_lines
@@ -68,8 +69,9 @@ def measure(
         check_targets(load_study(str(study)).targets)
     measured = run_measure(order)
     if report is not None:
+        from explorer.photograph.result import photograph_result
         from explorer.report.folder import write_report
-        from explorer.report.photograph import photograph_report, photograph_result, read_picture
+        from explorer.report.photograph import photograph_report, read_picture
 
         result = photograph_result(measured, author, notes)
         text = json_text(result.to_dict()) + "\n"

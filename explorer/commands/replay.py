@@ -20,7 +20,7 @@ def replay(
     """
     from explorer.errors import CommandError
     from explorer.files.run_folder import appearing
-    from explorer.logs.replay import check_recording, open_native, serve_replay, write_static_replay
+    from explorer.recordings.replay import check_recording, open_native, serve_replay, write_static_replay
 
     if native and static:
         raise CommandError("--native and --static exclude each other")

@@ -21,7 +21,8 @@ def report(
 
     Of one folder the report is made again, with today's figures.
     """
-    from explorer.files.run_folder import appearing, check_vacant
+    from explorer.files.output_file import check_vacant
+    from explorer.files.run_folder import appearing
     from explorer.files.run_result import made_today
     from explorer.report.folder import write_report
     from explorer.report.project import finished_folders, project_report

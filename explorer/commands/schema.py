@@ -19,7 +19,7 @@ KINDS = {
     "factors": ("explorer.design.factors_file", "FactorsTable"),
     "part": ("explorer.laboratory.part", "PartFile"),
     "preset": ("explorer.scene.presets", "PresetFile"),
-    "events": ("explorer.background.progress", "ProgressEvent"),
+    "events": ("explorer.background.events", "ProgressEvent"),
 }
 """Kind of file → where its table is declared. Read when one is asked for: help loads no solver."""
 

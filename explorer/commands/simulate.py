@@ -102,8 +102,8 @@ def simulate(
     if checkpoint and not checkpoint.absolute().parent.is_dir():
         raise CommandError(f"--checkpoint: {checkpoint}: no folder {checkpoint.absolute().parent}")
     if record:
-        from explorer.logs.pour_recorder import recorder_of
-        from explorer.logs.recording import recorded_lines
+        from explorer.recordings.pour_recorder import recorder_of
+        from explorer.recordings.recording import recorded_lines
     scene = with_settings(load_scene(source, material), set_)
     if scene.rig.name in BENCH_RIGS:
         if record or checkpoint or resume or replicates > 1 or events or scheduler:

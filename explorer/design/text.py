@@ -8,16 +8,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from doe.analysis.mixture import bearable_order, mixture_terms
-from doe.analysis.models import Order, bearable, highest_order, terms_of
-from doe.analysis.named_factors import order_of_names, orders_of
-from doe.analysis.power import TermPrecision, precision, precision_of_names
-from doe.analysis.surface import Blocks
 from doe.designs import factor_letters
 from doe.record import plain
-from explorer.design.factors_file import DesignFactor, FactorsFile, region_of
+from explorer.design.factors_file import DesignFactor, FactorsFile
+from explorer.design.plan_result import OF_NAMES, TERMS, beyond, blocks, planned_order, planned_power
 from explorer.design.result import DesignResult
 from explorer.design.run_plan import RunPlan
 from explorer.errors import CommandError
@@ -37,19 +32,7 @@ from explorer.report.design.sections import factor_table, in_short, settings_tab
 from explorer.report.design.surrogate import errors_table, lengths_table, process_settings
 from explorer.report.sections.surface import anova_table, variance_table
 from explorer.tables.text_table import text_table
-from explorer.units import enumeration, number
-
-TERMS = {
-    "factor": "of a factor",
-    "name": "between two names",
-    "interaction": "of an interaction",
-    "square": "curvature, centre → end",
-}
-"""Kind of a term → the change that it is, in words."""
-OF_NAMES = (
-    "A factor of three names and more is tested by all of them at once (F); the change is that between two of its "
-    "names, the others midway, which is seen least."
-)
+from explorer.units import number
 
 
 def check_power(sigma: float | None, effect: float | None) -> None:
@@ -114,39 +97,8 @@ def plan_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: flo
     return "\n\n".join([*parts, *plan.points.notes, _power_text(plan, file, sigma, effect)])
 
 
-def _many_names(file: FactorsFile) -> bool:
-    """Whether a factor has more names than the polynomials of `doe.analysis` tell apart."""
-    return any(len(factor.levels) > 2 for factor in file.factors)
-
-
-def _names(file: FactorsFile) -> list[int]:
-    """Number of names per factor, 0 of a number."""
-    return [len(factor.levels) for factor in file.factors]
-
-
 def _range(factor: DesignFactor) -> list[str]:
     return [number(factor.low, 6), number(factor.high, 6), factor.unit or "1"]
-
-
-def beyond(plan: RunPlan, file: FactorsFile) -> list[str]:
-    """A sentence about runs beyond low … high, which a laboratory may not be able to make."""
-    if plan.finished or np.abs(plan.coded).max() <= 1 + 1e-9:
-        return []
-    natural = region_of(file.factors).natural(plan.coded)
-    ends = [
-        f"{factor.name} {number(low, 6)} … {number(high, 6)}"
-        for factor, low, high in zip(file.factors, natural.min(axis=0), natural.max(axis=0), strict=True)
-    ]
-    return [f"The axial runs go beyond low … high: {enumeration(ends)}. --alpha inscribed keeps them within."]
-
-
-def blocks(plan: RunPlan) -> list[str]:
-    """A sentence about the blocks: their sizes, in the order in which they are run."""
-    if not len(plan.block):
-        return []
-    sizes = ", ".join(map(str, np.bincount(plan.block)))
-    of = "whole replicates" if not len(plan.points.block) else "rows"
-    return [f"Blocks of {of}, of {sizes} runs, one block after the other, shuffled within each."]
 
 
 def _power_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: float | None) -> str:
@@ -186,40 +138,6 @@ def _mixture_text(plan: RunPlan) -> str:
     terms = len(mixture_terms(letters, order))
     df = len(plan.sequence) - terms
     return f"The runs bear Scheffé's {order} polynomial ({terms} terms), with {df} degrees of freedom for the error."
-
-
-def planned_order(plan: RunPlan, file: FactorsFile) -> Order | None:
-    """The model that the runs bear beside their blocks; None where they leave no error even for the linear one."""
-    letters = factor_letters(plan.coded.shape[1])
-    runs, values = plan.coded[plan.sequence[:, 0]], np.zeros((len(plan.sequence), 1))
-    if _many_names(file):
-        found = order_of_names(runs, _names(file), plan.block)
-        return "linear" if found is not None and plan.design.main_effects_only else found
-    blocks = None
-    if len(plan.block):
-        names = tuple(str(number + 1) for number in range(plan.block.max() + 1))
-        blocks = Blocks(names, plan.block[:, None])
-    linear = bearable(runs, values, letters, terms_of(letters, "linear"), blocks)
-    if plan.design.main_effects_only or not linear:
-        return "linear" if linear else None
-    return highest_order(runs, values, letters, blocks=blocks)
-
-
-def planned_power(
-    plan: RunPlan, file: FactorsFile, sigma: float | None, effect: float | None
-) -> tuple[TermPrecision, ...]:
-    """What the runs will tell of each kind of the model's terms, in units of sigma where that is not known."""
-    order = planned_order(plan, file)
-    if order is None:
-        return ()
-    letters = factor_letters(plan.coded.shape[1])
-    runs = plan.coded[plan.sequence[:, 0]]
-    # Without a sigma everything is counted in it.
-    if _many_names(file):
-        levels = _names(file)
-        terms = orders_of(levels)[order]
-        return precision_of_names(runs, levels, terms, sigma or 1.0, effect or math.nan, block=plan.block)
-    return precision(runs, letters, terms_of(letters, order), sigma or 1.0, effect or math.nan, block=plan.block)
 
 
 def analysis_text(result: DesignResult) -> str:

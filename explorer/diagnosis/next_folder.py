@@ -30,7 +30,7 @@ from doe.measurement.parameter_table import read_parameters
 from doe.record import plain
 from doe.table_file import read_table, read_text
 from explorer.errors import CommandError
-from explorer.files.output_file import write_whole
+from explorer.files.output_file import check_vacant, write_whole
 from explorer.report.diagnosis.wording import spelled
 from explorer.scene.text import toml_key, toml_value
 from explorer.units import code, enumeration, number, parameter_label, parameter_value, percent
@@ -87,8 +87,7 @@ def write_next(
     # It brings the solver's kernels along; whoever only writes a measurement's file needs none.
     from doe.diagnose.candidate_experiments import as_suggested
 
-    if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
-        raise CommandError(f"{folder}: is not empty; allowed: a folder that is new or empty")
+    check_vacant(folder, option="")
     table = read_toml(source / FILE)
     condition = next(one for one in measurement.conditions if one.name == suggestion.condition)
     stated = next(one for one in table["condition"] if one["name"] == condition.name)

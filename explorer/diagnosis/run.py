@@ -51,7 +51,7 @@ from explorer.diagnosis.result import (
     Rule,
 )
 from explorer.errors import CommandError
-from explorer.files.output_file import check_new_file, write_whole
+from explorer.files.output_file import check_new_file, check_vacant, write_whole
 from explorer.files.run_result import made_today, versions
 from explorer.report.diagnosis import diagnosis_report
 from explorer.report.folder import write_report
@@ -143,8 +143,7 @@ def run_diagnose(order: DiagnoseOrder, reporter: Reporter) -> DiagnosisResult:
     if unknown:
         raise CommandError(f"--effects: {unknown[0]!r} is not one of {', '.join(EFFECTS)}")
     measurement = load_measurement(order.folder)
-    if order.out.is_file() or (order.out.is_dir() and any(order.out.iterdir()) and not order.resume):
-        raise CommandError(f"--out {order.out}: is not empty; name a new folder, or add --resume to go on there")
+    check_vacant(order.out, resume=order.resume)
     asked = read_next(order.follow_up) if order.follow_up else None
     earlier = NOTHING_BEFORE
     if order.given is not None:
@@ -279,7 +278,7 @@ def _absolute(path: Path | str | None) -> str | None:
 
 def _recorded(path: Path, result: DiagnosisResult, say: Callable[[str], None]) -> None:
     # rerun takes a second to import; only those who record pay for it.
-    from explorer.logs.answer_recording import record_diagnosis
+    from explorer.recordings.answer_recording import record_diagnosis
 
     record_diagnosis(path, result, say)
 

@@ -1,20 +1,36 @@
-"""A file that a command makes: refused before any work where it cannot be made; then there complete or not at all."""
+"""What a command makes: refused before any work where it cannot be made; a file is there complete or not at all."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from explorer.errors import CommandError
 
 
-def check_new_file(path: Path, suffix: str) -> None:
-    """Raise :class:`CommandError` unless ``path`` ends in ``suffix``, is new and has a folder."""
-    if path.suffix != suffix:
-        raise CommandError(f"{path}: the name must end in {suffix}")
+def check_new_file(path: Path, suffix: str = "", option: str = "") -> None:
+    """Raise :class:`CommandError` unless ``path``, named by ``option``, ends in ``suffix``, is new and has a folder."""
+    named = f"{option} {path}".lstrip()
+    if suffix and path.suffix != suffix:
+        raise CommandError(f"{named}: the name must end in {suffix}")
     if path.exists():
-        raise CommandError(f"{path}: exists already; choose another name")
+        raise CommandError(f"{named}: exists already; choose another name")
     if not path.absolute().parent.is_dir():
-        raise CommandError(f"{path}: there is no folder {path.absolute().parent}")
+        raise CommandError(f"{named}: there is no folder {path.absolute().parent}")
+
+
+def check_vacant(folder: Path, option: str = "--out", own: Sequence[Path] = (), resume: bool | None = None) -> None:
+    """Raise :class:`CommandError` unless ``folder``, which ``option`` named, is missing or holds at most ``own``.
+
+    ``resume``: whether the command is to go on with what is there; None of one that cannot.
+    """
+    named = f"{option} {folder}".lstrip()
+    if folder.exists() and not folder.is_dir():
+        raise CommandError(f"{named}: is a file; name a folder that is new or empty")
+    known = {path.resolve() for path in own}
+    if not resume and folder.is_dir() and any(one.resolve() not in known for one in folder.iterdir()):
+        go_on = "" if resume is None else ", or add --resume to go on there"
+        raise CommandError(f"{named}: is not empty; name a folder that is new or empty{go_on}")
 
 
 def write_whole(path: Path, text: str) -> None:

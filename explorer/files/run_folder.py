@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from explorer.errors import CommandError
+from explorer.files.output_file import check_vacant
 from solver import Record
 
 TRACE_COLUMNS = {
@@ -38,14 +38,6 @@ TRACE_COLUMNS = {
     "supplied_energy_J": "supplied_energy",
 }
 """Columns of a trace file → curves of ``solver.Trace``; ``max_overlap`` is in radii of the sphere."""
-
-
-def check_vacant(folder: Path, option: str = "--out") -> None:
-    """Raise :class:`CommandError` unless ``folder``, which ``option`` named, is missing or empty."""
-    if folder.exists() and not folder.is_dir():
-        raise CommandError(f"{option} {folder}: is a file; name a folder that is new or empty")
-    if folder.is_dir() and any(folder.iterdir()):
-        raise CommandError(f"{option} {folder}: is not empty; name a folder that is new or empty")
 
 
 @contextmanager

@@ -40,7 +40,8 @@ from explorer.measured.folder import NewCondition, write_condition, written_text
 from explorer.measured.readings import Brought
 from explorer.photograph.annotated import sheet
 from explorer.photograph.marks import UNMARKED, Marks
-from explorer.photograph.run import MeasuredPhotographs, MeasureOrder, measure_order, outline_text, run_measure
+from explorer.photograph.result import MeasuredPhotographs
+from explorer.photograph.run import MeasureOrder, measure_order, outline_text, run_measure
 from explorer.photograph.target import PhotographedTarget, check_targets, keep_target
 from explorer.report.bench import bench_record, bench_report
 from explorer.report.design import design_html

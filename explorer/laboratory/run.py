@@ -11,8 +11,8 @@ from doe.laboratory import LabResult, analyse
 from doe.laboratory.analysis import analyse_composition, analyse_elastic, template_of
 from doe.laboratory.bias import BiasTable, bias_table
 from explorer.errors import CommandError
-from explorer.files.output_file import check_new_file, write_whole
-from explorer.files.run_folder import appearing, check_vacant, json_text
+from explorer.files.output_file import check_new_file, check_vacant, write_whole
+from explorer.files.run_folder import appearing, json_text
 from explorer.files.run_result import made_today
 from explorer.laboratory.part import part_table, part_text, with_part
 from explorer.laboratory.twin_row import TwinRow, check_twin

@@ -23,7 +23,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from doe.store import Store, default_store
-from explorer.background.progress import Bar
+from explorer.background.bar import Bar
 from explorer.outcomes import outcome_text
 from explorer.scene.file import named_scene
 from solver import (

@@ -13,7 +13,8 @@ from pathlib import Path
 from explorer.errors import CommandError
 from explorer.files.output_file import check_new_file, write_whole, write_whole_bytes
 from explorer.photograph.annotated import sheet
-from explorer.photograph.simulated import SimulatedPiles, simulated_piles
+from explorer.photograph.result import MeasuredPhotographs
+from explorer.photograph.simulated import simulated_piles
 from solver.assets import asset_path
 from solver.photograph import (
     Board,
@@ -107,26 +108,6 @@ def _numbers(text: str, option: str, form: str) -> tuple[float, ...]:
     if len(numbers) != n or not all(abs(number) <= FARTHEST for number in numbers):
         raise CommandError(f"{option} {text}: allowed is {form}, in pixels of the picture")
     return numbers
-
-
-@dataclass(frozen=True, eq=False)
-class MeasuredPhotographs:
-    """What came out, in the order of the pictures."""
-
-    readings: tuple[PhotographedPile | Refusal, ...]
-    simulated: SimulatedPiles | None
-    board: Board | None = None
-    """The checkerboard that told the lens."""
-
-    @property
-    def piles(self) -> tuple[PhotographedPile, ...]:
-        """Of the pictures that show one."""
-        return tuple(reading for reading in self.readings if isinstance(reading, PhotographedPile))
-
-    @property
-    def refusals(self) -> tuple[Refusal, ...]:
-        """Of the others."""
-        return tuple(reading for reading in self.readings if isinstance(reading, Refusal))
 
 
 def run_measure(order: MeasureOrder) -> MeasuredPhotographs:

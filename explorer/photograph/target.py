@@ -32,9 +32,8 @@ from explorer.errors import CommandError
 from explorer.files.output_file import write_whole, write_whole_bytes
 from explorer.files.run_folder import json_text
 from explorer.files.uploads import label
-from explorer.photograph.run import MeasuredPhotographs
+from explorer.photograph.result import MeasuredPhotographs, PhotographResult, ReadPile, photograph_result
 from explorer.report.figures.pours import Backdrop
-from explorer.report.photograph import PhotographResult, ReadPile, photograph_result
 from explorer.study.edit import remeasured
 from explorer.tables.photograph import angle_words
 from explorer.units import enumeration, fixed

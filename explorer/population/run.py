@@ -16,7 +16,7 @@ from doe.run_records import Setting
 from doe.store import Store, default_store
 from explorer.background.progress import RunProgress, told_of_pauses
 from explorer.background.reporter import Reporter
-from explorer.errors import CommandError
+from explorer.files.output_file import check_vacant
 from explorer.population.process import populations
 from solver import Scene, executor, observable_names, run_queue
 from solver.arch import chosen
@@ -46,8 +46,8 @@ def pour_more(order: PoursOrder, reporter: Reporter) -> tuple[Population, ...]:
     Seeds are the smallest from 1 on that the store does not hold for this scene. Finished pours are kept whatever
     happens to the rest.
     """
-    if order.out is not None and order.out.exists() and any(order.out.iterdir()):
-        raise CommandError(f"--out {order.out}: is not empty; name a new folder")
+    if order.out is not None:
+        check_vacant(order.out)
     path = order.store or default_store()
     workers = min(order.threads or os.cpu_count() or 1, order.pours)
     with ExitStack() as stack:

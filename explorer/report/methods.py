@@ -36,10 +36,10 @@ from solver.laws import CONTACT_LAWS, HertzMindlin, LinearSpringDashpot
 
 if TYPE_CHECKING:
     from doe.audit import Audit
+    from explorer.design.plan_result import PlanResult
     from explorer.design.result import DesignResult
     from explorer.diagnosis.result import DiagnosisResult
-    from explorer.report.design.plan import PlanResult
-    from explorer.report.photograph import PhotographResult
+    from explorer.photograph.result import PhotographResult
 
 Methods = tuple[Section, tuple[Reference, ...]]
 """The section, and its sources as entries."""

@@ -20,18 +20,20 @@ from PIL import Image
 from doe.provenance import About
 from doe.studies.study_result import StudyResult
 from explorer.audit.report import AuditResult, audit_report
+from explorer.design.plan_result import PlanResult
 from explorer.design.result import DesignResult
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.errors import CommandError
+from explorer.photograph.result import PhotographResult
 from explorer.project.project import FILE, load_project
 from explorer.report import study_report
 from explorer.report.bench import BenchResult, bench_report
 from explorer.report.content import Banner, Block, Drawing, Figure, Folded, Picture, Report, Section, Strong, Table
 from explorer.report.design import design_report
-from explorer.report.design.plan import PlanResult, plan_report
+from explorer.report.design.plan import plan_report
 from explorer.report.diagnosis import diagnosis_report
 from explorer.report.figures.pours import outlines_caption, pile_outlines
-from explorer.report.photograph import MOST_BYTES, READ, PhotographResult, photograph_report, png_within
+from explorer.report.photograph import MOST_BYTES, READ, photograph_report, png_within
 
 Content = Mapping[str, Any]
 

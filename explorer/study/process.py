@@ -20,8 +20,8 @@ from explorer.background.command_process import (
     PourPlace,
     WaitingLine,
 )
+from explorer.background.events import given_up
 from explorer.background.output_folder import finished, new_folder, newest_unfinished
-from explorer.background.progress import given_up
 from explorer.files.output_file import write_whole
 from explorer.photograph.target import FOLDER, PhotographedTarget, load_target
 from explorer.study.edit import StudyEdits, edited_study

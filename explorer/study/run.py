@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import json
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -41,11 +41,11 @@ from explorer.background.output_folder import kept_for_one, read_result
 from explorer.background.progress import RunProgress, told_of_pauses
 from explorer.background.reporter import Reporter
 from explorer.errors import CommandError
-from explorer.files.output_file import check_new_file, write_whole
+from explorer.files.output_file import check_new_file, check_vacant, write_whole
 from explorer.files.run_result import made_today, versions
+from explorer.photograph.result import PhotographResult
 from explorer.photograph.target import FOLDER, PhotographedTarget, load_target
 from explorer.report import write_report
-from explorer.report.photograph import PhotographResult
 from explorer.report.set_up import set_up_of
 from explorer.study.duration import duration_text
 from explorer.study.process import PARTIAL, RESULT
@@ -56,11 +56,9 @@ from solver.observables.repose import AZIMUTHS_DEG, flank_feet, outline
 from solver.rigs.rig import PILE
 
 if TYPE_CHECKING:
-    from explorer.logs.pour_recorder import StudyRecorder
+    from explorer.recordings.pour_recorder import StudyRecorder
 
 NOBODY = About()
-REFERENCE = "reference"
-"""Label of the pilot's first setting."""
 SILHOUETTE_POINTS = 161
 FloatArray = npt.NDArray[np.float64]
 
@@ -108,9 +106,9 @@ def run_study(order: StudyOrder, reporter: Reporter) -> StudyResult:
     photographed = given_target(order)
     if photographed is not None:
         study = replace(study, targets=photographed.of_study(study.targets))
+    # The page puts these there before the start.
     own = [study.file, *([order.target] if order.target else [])]
-    if order.out.is_file() or (holds_more_than(order.out, own) and not order.resume):
-        raise CommandError(f"--out {order.out}: is not empty; name a new folder, or add --resume to go on there")
+    check_vacant(order.out, own=own, resume=order.resume)
     # A recorder watches pours from within; all others run in processes of their own.
     apart = order.record is None and chosen() == "cpu"
     # The executor before anything is in the folder: perhaps no scheduler answers.
@@ -185,7 +183,7 @@ def _run(
 def poured_piles(stages: Stages, store: Store) -> tuple[PouredPile, ...]:
     """Mean silhouettes at the reference setting and at the optimum, read off the stored pours; none that are lost."""
     chosen = (
-        ("reference", [run for run in stages.own_runs_of("pilot") if run.label == REFERENCE]),
+        ("reference", stages.reference_runs()),
         ("optimum", stages.own_runs_of("verification")),
     )
     seen = [
@@ -234,21 +232,15 @@ def given_target(order: StudyOrder) -> PhotographedTarget | None:
     return found
 
 
-def holds_more_than(folder: Path, own: Sequence[Path]) -> bool:
-    """True if ``folder`` holds anything but the study's ``own`` files, which the page puts there before the start."""
-    known = {path.resolve() for path in own}
-    return folder.is_dir() and any(entry.resolve() not in known for entry in folder.iterdir())
-
-
 def _recorder(folder: Path) -> StudyRecorder:
     # rerun takes a second to import; only those who record pay for it.
-    from explorer.logs.pour_recorder import StudyRecorder
+    from explorer.recordings.pour_recorder import StudyRecorder
 
     return StudyRecorder(folder)
 
 
 def _record_piles(path: Path, result: StudyResult, say: Callable[[str], None]) -> None:
-    from explorer.logs.answer_recording import record_study
+    from explorer.recordings.answer_recording import record_study
 
     record_study(path, result, say)
 

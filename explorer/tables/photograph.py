@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
+from explorer.photograph.result import BASES, MeasuredPhotographs
+from explorer.photograph.simulated import SimulatedPiles
 from explorer.tables.text_table import text_table
 from explorer.units import MISSING, fixed, signed
 from solver.photograph import Board, PhotographedPile, Refusal
 from solver.photograph.reading_error import COVERAGE, Angle
-
-if TYPE_CHECKING:
-    from explorer.photograph.run import MeasuredPhotographs
-    from explorer.photograph.simulated import SimulatedPiles
 
 Array = npt.NDArray[np.float64]
 MOST_POINTS = 400
@@ -29,12 +27,6 @@ NOTE = (
     "differs by far more. Thirds: lower, middle and upper third of the fit. Roughness: RMS distance of the outline "
     "from its lines."
 )
-BASES = {
-    "plate": "the plate beside the pile",
-    "foot": "the foot of the pile",
-    "given": "--baseline",
-    "support": "the top of what is under the pile",
-}
 
 
 def measure_text(measured: MeasuredPhotographs) -> str:

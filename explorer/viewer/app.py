@@ -11,9 +11,9 @@ from types import FrameType
 
 from explorer.background.command_process import PourPlace
 from explorer.diagnosis.process import DiagnoseProcess
-from explorer.logs.recording import RunningViewer, recorded_lines
+from explorer.live.session import Session
 from explorer.project.project import Project
-from explorer.session import Session
+from explorer.recordings.recording import RunningViewer, recorded_lines
 from explorer.study.process import CalibrationProcess
 from explorer.viewer.board.folder_board import FolderBoard
 from explorer.viewer.guarded_server import address, guarded_server
@@ -109,7 +109,7 @@ def replay(
         PortError: the port is busy, the host is not of this machine, or others can reach it without a token.
     """
     # Imported here: rerun takes a second to load, and a live page needs none of it.
-    from explorer.logs.recording_reader import read_recording
+    from explorer.recordings.recording_reader import read_recording
     from explorer.viewer.replay.replay_page import ReplayPage
 
     read = read_recording(recording)

@@ -25,9 +25,9 @@ from explorer.diagnosis.process import DiagnosisProcess
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, SessionState, Status
 from explorer.live.preview import load_preview
+from explorer.live.session import Session
 from explorer.project.project import Project
 from explorer.scene.presets import data_folder
-from explorer.session import Session
 from explorer.study.process import StudyProcess
 from explorer.viewer.actions import Actions, FrameClock
 from explorer.viewer.guarded_server import GuardedServer

@@ -17,11 +17,11 @@ from explorer.background.command_process import PourPlace
 from explorer.diagnosis.process import DiagnosisProcess
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, Status
+from explorer.live.session import Session
 from explorer.photograph.target import TargetFile
 from explorer.project.project import Project
 from explorer.project.steps import Room
 from explorer.scene.link import pour_text
-from explorer.session import Session
 from explorer.study.process import StudyProcess
 from explorer.viewer.actions import BackgroundWork, Post
 from explorer.viewer.guarded_server import GuardedServer

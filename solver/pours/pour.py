@@ -36,7 +36,16 @@ from solver.pours.record_builder import (
     trace_of,
 )
 from solver.pours.supply import Supply
-from solver.pours.verdict import RUNNING, Moment, may_be_over, stalled, verdict
+from solver.pours.verdict import (
+    RUNNING,
+    Moment,
+    at_rest,
+    may_be_over,
+    slow_moments,
+    speed_that_counts,
+    stalled,
+    verdict,
+)
 from solver.rigs.outlet import Obstruction, obstruction
 from solver.rigs.rig import Container, Switch
 from solver.scenes.scene import Scene, actual, pour_rig
@@ -298,11 +307,11 @@ class Pour:
         row["lost"] = float(self.batch.take_out(self.w))
         self.samples.append(row)
         self._insert()
-        self._moving = max(row["speed"], row["funnel_speed"] if self.gate_shut else 0.0)
-        quiet = self._moving < self.scene.numerics.rest_speed and self._motion is None
-        self._quiet_samples = self._quiet_samples + 1 if quiet else 0
+        numerics = self.scene.numerics
+        self._moving = speed_that_counts(row, self.gate_shut)
+        self._quiet_samples = slow_moments(self._quiet_samples, self._moving, self._motion is not None, numerics)
         self._watch()
-        self.ended = verdict(self.rig, self.scene.numerics, self._moment(row))
+        self.ended = verdict(self.rig, numerics, self._moment(row))
         self.outcome, self.message = self._told()
         waiting = self.time > self.supply.last_entry + SETTLE_LIMIT
         if self.gate_shut and (self.supply.missing == 0 or self._blocked()) and (self._quiet() or waiting):
@@ -324,8 +333,7 @@ class Pour:
         return kept.outcome, kept.message
 
     def _quiet(self) -> bool:
-        numerics = self.scene.numerics
-        return self._quiet_samples * numerics.sample_interval >= numerics.rest_time
+        return at_rest(self._quiet_samples, self.scene.numerics)
 
     def _blocked(self) -> bool:
         """The next body has been due for long and finds no place: the rig is full to the feed opening."""

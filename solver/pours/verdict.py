@@ -1,4 +1,9 @@
-"""How a pour stands at a moment of decision: still running, or over, and how. Pure functions of that moment."""
+"""How a pour stands at a moment of decision: still running, at rest, or over in another way. Pure functions of it.
+
+At rest: what counts has been slower than ``numerics.rest_speed`` for ``numerics.rest_time``. The speed of a body is
+√(2 kinetic energy / mass), so one that spins on the spot is not at rest. What counts is all but bodies that roll away
+beyond the pile (``rolls_away`` of ``engine/kernels/batch.py``), and the filling of a rig while its gate is shut.
+"""
 
 from __future__ import annotations
 
@@ -55,6 +60,21 @@ def verdict(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
     if moment.time >= numerics.max_time:
         return Outcome.TIME_LIMIT, f"still moving at {moment.speed:.3g} m/s after {numerics.max_time:g} s"
     return RUNNING
+
+
+def speed_that_counts(row: Mapping[str, float], gate_shut: bool) -> float:
+    """The largest speed [m/s] in a world's summary (columns of ``world.SUMMARY_COLUMNS``)."""
+    return max(row["speed"], row["funnel_speed"] if gate_shut else 0.0)
+
+
+def slow_moments(before: int, speed: float, disturbed: bool, numerics: Numerics) -> int:
+    """Moments of decision in a row at which all was slow: ``before`` and this one; 0 while the plate is moved."""
+    return before + 1 if speed < numerics.rest_speed and not disturbed else 0
+
+
+def at_rest(slow: int, numerics: Numerics) -> bool:
+    """Whether all has been slow for long enough, after ``slow`` moments of decision at which it was."""
+    return slow * numerics.sample_interval >= numerics.rest_time
 
 
 def stalled(samples: Sequence[Mapping[str, float]], numerics: Numerics, since: float) -> bool:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from explorer.live.preview import FOLDER, Preview, save_preview
-from explorer.logs.recording_reader import read_recording
 from explorer.project.project import study_project
+from explorer.recordings.recording_reader import read_recording
 from explorer.scene.file import DEFAULT_STUDY
 
 SEED = 1

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from explorer.logs.recording_reader import read_recording
+from explorer.recordings.recording_reader import read_recording
 from tests.browser import test_page as shared
 from tests.browser.served import served
 from tests.browser.test_page import SETTINGS, positions, room, simulated_time, slider, state, to_its_end, wait_for

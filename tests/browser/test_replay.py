@@ -4,12 +4,12 @@ import re
 
 import pytest
 
-from explorer.logs.pour_log import PourLog
+from explorer.recordings.pour_log import PourLog
 from explorer.scene.file import load_scene
 from tests.browser.served import served
 from tests.browser.test_look import colours, press
 from tests.browser.test_page import FLAGS, PATIENCE, positions, slider, wait_for
-from tests.explorer.logs.test_pour_log import poses
+from tests.explorer.recordings.test_pour_log import poses
 
 pytestmark = pytest.mark.browser
 

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from explorer.logs.pour_log import PourLog
-from explorer.logs.replay import replay_server
+from explorer.recordings.pour_log import PourLog
+from explorer.recordings.replay import replay_server
 from explorer.scene.file import load_scene
 from tests.browser.test_page import FLAGS, PATIENCE
 from tests.explorer.background.waiting import wait_for
-from tests.explorer.logs.test_pour_log import poses
+from tests.explorer.recordings.test_pour_log import poses
 
 pytestmark = pytest.mark.browser
 

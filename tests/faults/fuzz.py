@@ -93,7 +93,7 @@ def _a_store() -> Path:
 
 def _recording(path: Path) -> None:
     # Imported here: rerun takes a second to load.
-    from explorer.logs.recording_reader import read_recording
+    from explorer.recordings.recording_reader import read_recording
 
     read_recording(path)
 

@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 from PIL import Image
 
-from tests.explorer.logs.test_pour_log import poses
+from tests.explorer.recordings.test_pour_log import poses
 from tests.solver.photograph.drum_faces import Look, drawn, plane
 
 _place = tempfile.TemporaryDirectory()
@@ -99,7 +99,7 @@ def glb_elsewhere(glb: bytes, uri: str) -> bytes:
 def recordings() -> tuple[Path, ...]:
     """A recording of a pour."""
     # Imported here: rerun takes a second to load.
-    from explorer.logs.pour_log import PourLog
+    from explorer.recordings.pour_log import PourLog
     from explorer.scene.file import load_scene
 
     path = _folder("recordings") / "pour.rrd"

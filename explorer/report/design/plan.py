@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from doe.analysis.power import TermPrecision
 from doe.designs import DESIGNS, factor_letters
-from doe.provenance import About
-from doe.record import Document
-from explorer.design.factors_file import DesignFactor, FactorsFile, region_of
-from explorer.design.run_plan import BLOCK, COLUMNS, RunPlan, level_text
-from explorer.design.text import OF_NAMES, TERMS, beyond, blocks, planned_order, planned_power
-from explorer.files.run_result import versions
+from explorer.design.factors_file import DesignFactor, region_of
+from explorer.design.plan_result import OF_NAMES, TERMS, PlanResult
+from explorer.design.run_plan import BLOCK, COLUMNS, level_text
 from explorer.report.content import (
     Banner,
     Block,
@@ -47,8 +41,6 @@ from explorer.report.figures.style import (
 from explorer.report.methods import plan_methods
 from explorer.units import enumeration, number
 
-Array = npt.NDArray[np.float64]
-
 MOST_ROWS = 60
 """Runs that the page lists; the data have all."""
 ROW = 30
@@ -57,66 +49,6 @@ WANTED = 0.8
 """Chance to see a change, by which the smallest one is told."""
 FURTHEST = 2.0
 """Of the largest of these changes, up to which chances are drawn."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class PlanResult(Document):
-    """A design with the order of its runs: the content of ``plan.json``.
-
-    ``coded``: levels of its rows, −1 … +1, shape (rows, k). ``sequence``: row and replicate of every run, from 1, in
-    the order to make them; ``seeds`` and ``block`` (from 1, empty without blocks) of each. ``model``, ``power``: the
-    polynomial that the runs bear, and what they tell of its terms, in units of ``sigma``, or of it where that is NaN.
-    """
-
-    SCHEMA: ClassVar[int] = 1
-    NAME: ClassVar[str] = "plan.json"
-
-    kind: str = "design"
-    title: str
-    design: str
-    traits: tuple[str, ...]
-    factors: tuple[DesignFactor, ...]
-    responses: tuple[str, ...]
-    replicates: int
-    seed: int
-    coded: Array
-    sequence: tuple[tuple[int, int], ...]
-    seeds: tuple[int, ...]
-    block: tuple[int, ...]
-    aliases: tuple[str, ...]
-    notes: tuple[str, ...]
-    model: str
-    power: tuple[TermPrecision, ...]
-    sigma: float
-    versions: dict[str, str | None]
-    about: About = field(default_factory=About)
-
-
-def design_plan(
-    plan: RunPlan, file: FactorsFile, sigma: float | None, effect: float | None, about: About
-) -> PlanResult:
-    """The record of ``plan``; ``sigma``: standard deviation of one run, ``effect``: a change to see, where known."""
-    order = planned_order(plan, file)
-    return PlanResult(
-        title=file.title,
-        design=plan.design.name,
-        traits=(*plan.points.traits, *plan.points.generators),
-        factors=file.factors,
-        responses=file.response_titles,
-        replicates=plan.replicates,
-        seed=plan.seed,
-        coded=plan.coded,
-        sequence=tuple((int(row) + 1, int(replicate) + 1) for row, replicate in plan.sequence),
-        seeds=tuple(map(int, plan.seeds)),
-        block=tuple(int(one) + 1 for one in plan.block),
-        aliases=plan.points.aliases,
-        notes=(*beyond(plan, file), *blocks(plan), *plan.points.notes),
-        model=order or "",
-        power=planned_power(plan, file, sigma, effect),
-        sigma=math.nan if sigma is None else sigma,
-        versions=versions(),
-        about=about,
-    )
 
 
 def plan_report(result: PlanResult) -> Report:

@@ -15,7 +15,7 @@ import viser
 
 from explorer.errors import CommandError
 from explorer.files.exports import zipped
-from explorer.logs.recording import recorded_lines
+from explorer.recordings.recording import recorded_lines
 from explorer.viewer.guarded_server import address, guarded_server
 from explorer.viewer.output.recording_switch import HTML, RRD, RecordingSwitch
 from explorer.viewer.output.send_file import refuse_large, send_file
@@ -115,7 +115,7 @@ class ReplayBeside:
 
     def __init__(self, recording: Path, host: str, token: str | None) -> None:
         # Imported here: rerun takes a second to load, and most sessions are not replayed.
-        from explorer.logs.recording_reader import read_recording
+        from explorer.recordings.recording_reader import read_recording
         from explorer.viewer.replay.replay_page import ReplayPage
 
         read = read_recording(recording)

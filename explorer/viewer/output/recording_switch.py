@@ -18,7 +18,7 @@ from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
 from explorer.live.frames import Frame
 from explorer.live.messages import Status
-from explorer.logs.recording import RecordedPour, RunningViewer
+from explorer.recordings.recording import RecordedPour, RunningViewer
 from explorer.viewer.actions import BackgroundWork
 
 MOST_BYTES = 150e6
@@ -67,7 +67,7 @@ class Recorder(Protocol):
 def session_recorder(to: Path | RunningViewer) -> Recorder:
     """A recording of rerun's into the new file ``to``, or into a viewer that is open."""
     # Imported here: rerun takes a second to load, and most sessions are not recorded.
-    from explorer.logs.session_recorder import SessionRecorder
+    from explorer.recordings.session_recorder import SessionRecorder
 
     return SessionRecorder(to)
 

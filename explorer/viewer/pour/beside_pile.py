@@ -17,8 +17,8 @@ import viser
 
 from explorer.diagnosis.piles import HeightSurface
 from explorer.live.messages import SessionState, Status
+from explorer.live.session import Session
 from explorer.scene.meshes import scene_height
-from explorer.session import Session
 from explorer.viewer.look.camera import aspect_of, go_to_place
 from explorer.viewer.palette import MEASURED, RIM
 from explorer.viewer.scene_nodes import LINE, PLATE_RADIUS, SceneNodes, another_set_up, circle

@@ -15,9 +15,9 @@ from typing import Any
 import viser
 
 from explorer.errors import CommandError
+from explorer.live.session import Session
 from explorer.scene.presets import Preset, preset_names, preset_path, preset_values, read_preset, save_preset
 from explorer.scene.source import Difference, differences, shown
-from explorer.session import Session
 from explorer.viewer.actions import add_keys, button_group
 from explorer.viewer.panel import SET_UP, Now, PageContext, Panel
 from explorer.viewer.view import small_html

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from explorer.live.messages import Status
 from explorer.viewer.actions import button_group
 from explorer.viewer.panel import CONTROLS, PageContext
-from explorer.viewer.pour.live_panel import LiveControl, control_for, screen_range, titled
+from explorer.viewer.pour.live_sliders import LiveControl, control_for, screen_range, titled
 from explorer.viewer.pour.rebuilt_panel import RebuiltPanel
 from explorer.viewer.pour.restart_panel import LARGEST_SEED, entered, on_screen, same_value
 from explorer.viewer.pour.second_pile import POUR_SECOND, SECOND_HINT

@@ -7,7 +7,7 @@ from typing import Any
 import viser
 
 from explorer.live.messages import Status
-from explorer.session import Session
+from explorer.live.session import Session
 from explorer.units import checked, screen_unit, title
 from explorer.viewer.actions import Post
 from explorer.viewer.panel import SET_UP

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from explorer.live.frames import NO_SURFACES, Frame
-from explorer.logs.recording import SAME_TIME, Component, Instances, Recording, index_at
+from explorer.recordings.recording import SAME_TIME, Component, Instances, Recording, index_at
 from explorer.scene.meshes import rig_poses
 from explorer.viewer.look.colour_by import STILL_SPEED, STILL_WORDS, ColourQuantity
 from solver.scenes.scene import Scene

@@ -21,7 +21,7 @@ import viser
 import viser.uplot
 
 from explorer.live.frames import Frame
-from explorer.logs.recording import SAME_TIME, RecordedSurface, Recording
+from explorer.recordings.recording import SAME_TIME, RecordedSurface, Recording
 from explorer.scene.meshes import GATE_NAME, PLATE_NAME, outlet_height, scene_height
 from explorer.units import checked
 from explorer.viewer.actions import Action, Actions, FrameClock, Post, add_keys, button_group

@@ -9,7 +9,7 @@ from typing import Protocol
 import viser
 
 from explorer.background.command_process import CommandStatus, PourPlace
-from explorer.background.progress import FailedRun, failures
+from explorer.background.events import FailedRun, failures
 from explorer.outcomes import outcome_text
 from explorer.viewer.actions import Action, Post, button_group
 

@@ -15,8 +15,8 @@ from doe.target import Target
 from explorer.background.command_process import CommandStatus
 from explorer.background.output_folder import ResultFile
 from explorer.errors import CommandError
+from explorer.live.session import Session
 from explorer.photograph.target import PhotographedTarget
-from explorer.session import Session
 from explorer.study.duration import duration_text
 from explorer.study.excluded_runs import keep_excluded, load_excluded
 from explorer.study.process import PARTIAL, RESULT, QueuedStudy

@@ -4,7 +4,8 @@ import json
 
 from doe.declared.pours import Ended
 from explorer.background.command_process import CommandStatus
-from explorer.background.progress import PourProgress, ProgressEvent, failures, with_event, with_run
+from explorer.background.events import ProgressEvent, failures, with_event, with_run
+from explorer.background.progress import PourProgress
 from explorer.background.reporter import Reporter
 from explorer.viewer.study.process_view import state_markdown
 from solver import Outcome

@@ -10,7 +10,8 @@ from dataclasses import replace
 import pytest
 
 from doe.declared.pours import Ended
-from explorer.background.progress import PROGRESS, PourProgress, SetProgress
+from explorer.background.events import PROGRESS
+from explorer.background.progress import PourProgress, SetProgress
 from explorer.background.reporter import LOG, MOST_SCENES, Reporter, reporter_of
 from explorer.errors import CommandError
 from explorer.scene.file import load_scene

@@ -536,7 +536,7 @@ def test_a_workbook_is_analysed_as_the_sheet_is(tmp_path):
 def test_a_sheet_is_not_written_over(tmp_path):
     path, _ = made(tmp_path, "box-behnken", "--factors", "sunflower_extract")
     before = path.read_text(encoding="utf-8")
-    assert "is there already" in refused(
+    assert "exists already" in refused(
         explorer("design", "box-behnken", "--factors", "sunflower_extract", "--out", path)
     )
     assert path.read_text(encoding="utf-8") == before

@@ -8,8 +8,8 @@ import urllib.request
 import pytest
 import rerun as rr
 
-from explorer.logs import replay
-from explorer.logs.replay import RECORDING_NAME, replay_page
+from explorer.recordings import replay
+from explorer.recordings.replay import RECORDING_NAME, replay_page
 from tests.explorer.command_line import explorer, refused
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from explorer.files.run_result import result_of
-from explorer.logs.recording import FRAME_INTERVAL
-from explorer.logs.recording_reader import read_recording
+from explorer.recordings.recording import FRAME_INTERVAL
+from explorer.recordings.recording_reader import read_recording
 from explorer.scene.file import load_scene, with_settings
 from solver import Outcome, run_pour, run_pours
 from solver.observables import Value, observe

@@ -181,7 +181,7 @@ def test_a_folder_that_is_not_empty_is_refused(tmp_path, measured):
     with pytest.raises(CommandError, match=r"^[^\n]*is not empty[^\n]*$"):
         written(tmp_path, SOURCE, measured)
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
-    with pytest.raises(CommandError, match="is not empty"):
+    with pytest.raises(CommandError, match="is a file"):
         written(tmp_path / "mine.txt", SOURCE, measured)
 
 

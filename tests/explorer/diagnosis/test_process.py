@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from explorer.background.command_process import BackgroundError, CommandStatus
-from explorer.background.progress import StageProgress
+from explorer.background.events import StageProgress
 from explorer.diagnosis.process import DiagnoseProcess, Question
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.priority import BACKGROUND

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from doe.store import Store
-from explorer.background.progress import PROGRESS
+from explorer.background.events import PROGRESS
 from explorer.background.reporter import Reporter
 from explorer.errors import CommandError
 from explorer.population.process import PopulationProcess

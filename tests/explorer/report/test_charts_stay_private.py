@@ -12,7 +12,7 @@ from doe.audit import audit_study
 from explorer.audit.read_study import read_study, shipped_study
 from explorer.audit.report import audit_html
 from explorer.design.analysis import AnalyseOrder, run_analyse
-from explorer.logs.replay import replay_page
+from explorer.recordings.replay import replay_page
 from explorer.report import report_html
 from explorer.report.content import Word
 from explorer.report.design import design_html

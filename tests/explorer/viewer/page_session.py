@@ -23,7 +23,7 @@ PROJECT = study_project("sunflower_extract")
 
 
 class PageSession:
-    """What panels ask of a :class:`explorer.session.Session`; ``asked`` are the calls, in order."""
+    """What panels ask of a :class:`explorer.live.session.Session`; ``asked`` are the calls, in order."""
 
     def __init__(self, source: SceneSource) -> None:
         self.source = source

@@ -7,7 +7,7 @@ import pytest
 from doe.studies.exclusion import ExcludedRun
 from doe.studies.study_result import study_from
 from explorer.background.command_process import CommandStatus
-from explorer.background.progress import StageProgress
+from explorer.background.events import StageProgress
 from explorer.errors import CommandError
 from explorer.report.content import Word
 from explorer.study.excluded_runs import keep_excluded

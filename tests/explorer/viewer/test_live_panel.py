@@ -14,17 +14,14 @@ from explorer.viewer.actions import Actions
 from explorer.viewer.panel import Now
 from explorer.viewer.pour.controls_panel import ControlsPanel
 from explorer.viewer.pour.live_panel import (
-    LiveControl,
     LiveSections,
-    decade_mark,
-    decades_around,
     echo_html,
     effect_targets,
-    factor_range,
     live_parameters,
     material_targets,
     pair_targets,
 )
+from explorer.viewer.pour.live_sliders import LiveControl, decade_mark, decades_around, factor_range
 from explorer.viewer.pour.restart_panel import PATHS, SetUpInputs, entered, label, size_paths
 from solver import load_material, parameters, with_values
 from solver.rigs import RIGS
@@ -169,7 +166,7 @@ def sections(server):
 @pytest.fixture
 def let_go(monkeypatch):
     """A call lets the time pass after which a control that a person moved follows the solver again."""
-    return lambda: monkeypatch.setattr("explorer.viewer.pour.live_panel.HANDS_OFF", 0.0)
+    return lambda: monkeypatch.setattr("explorer.viewer.pour.live_sliders.HANDS_OFF", 0.0)
 
 
 def friction(session):

@@ -17,8 +17,8 @@ from viser import _messages
 
 from explorer.errors import CommandError
 from explorer.live.messages import SessionState
-from explorer.logs.recording import RecordedPour
-from explorer.logs.recording_reader import read_recording
+from explorer.recordings.recording import RecordedPour
+from explorer.recordings.recording_reader import read_recording
 from explorer.scene.file import load_scene
 from explorer.scene.source import SceneSource, material_source
 from explorer.viewer.actions import Actions

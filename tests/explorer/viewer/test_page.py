@@ -10,8 +10,8 @@ import pytest
 
 from explorer.diagnosis.process import DiagnoseProcess
 from explorer.live.messages import Event, SessionState, Status
-from explorer.logs.recording_reader import read_recording
 from explorer.project.project import study_project
+from explorer.recordings.recording_reader import read_recording
 from explorer.scene.source import material_source
 from explorer.viewer.app import serve
 from explorer.viewer.guarded_server import guarded_server

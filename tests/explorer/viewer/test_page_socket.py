@@ -16,9 +16,9 @@ from viser import _messages
 
 from explorer.diagnosis.process import DiagnoseProcess
 from explorer.live.messages import SessionState
+from explorer.live.session import Session
 from explorer.scene.meshes import scene_height
 from explorer.scene.source import SceneSource, prepared_source
-from explorer.session import Session
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.look import drawn_look
 from explorer.viewer.look.camera import LINK, view_of

@@ -7,15 +7,8 @@ import pytest
 
 from explorer.scene.source import material_source
 from explorer.units import InputError
-from explorer.viewer.pour.live_panel import (
-    BOXES,
-    LivePanel,
-    PairMatrix,
-    matrix_html,
-    pair_parameters,
-    pair_targets,
-    triangle,
-)
+from explorer.viewer.pour.live_panel import LivePanel, pair_targets
+from explorer.viewer.pour.pair_matrix import BOXES, PairMatrix, matrix_html, pair_parameters, triangle
 from explorer.viewer.pour.restart_panel import RestartPanel, label
 from solver.params import declared
 from solver.scenes.material import Pair
@@ -91,7 +84,7 @@ def test_the_boxes_follow_the_solver_unless_a_person_is_at_the_row(server, monke
     made.follow(changed)
     assert person.value("seed") == 0.1
     assert person.value("petiole") == (0.54, 0.3, 0.83)
-    monkeypatch.setattr("explorer.viewer.pour.live_panel.HANDS_OFF", 0.0)  # the person has let go
+    monkeypatch.setattr("explorer.viewer.pour.pair_matrix.HANDS_OFF", 0.0)  # the person has let go
     made.follow(changed)
     assert person.value("petiole") == (0.54, 0.2, 0.83)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from explorer.logs.recording import Component, Instances, Recording, Shape
+from explorer.recordings.recording import Component, Instances, Recording, Shape
 from explorer.viewer.replay.recorded_frames import QUANTITIES, RecordedFrames, first_seen, mean_speeds, tells_who_is_who
 
 STEP, G = 0.02, 9.81

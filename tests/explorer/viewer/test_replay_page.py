@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from explorer.live.frames import Frame
-from explorer.logs.pour_log import PourLog
-from explorer.logs.recording_reader import read_recording
+from explorer.recordings.pour_log import PourLog
+from explorer.recordings.recording_reader import read_recording
 from explorer.scene.file import load_scene
 from explorer.scene.meshes import scene_height
 from explorer.viewer.guarded_server import guarded_server
@@ -23,7 +23,7 @@ from explorer.viewer.replay.replay_page import PLAY_PAUSE, ReplayPage, columns, 
 from explorer.viewer.scene_nodes import PLATE_RADIUS, SceneNodes, plate_radius
 from explorer.viewer.view import light, look_at_height
 from tests.explorer.background.waiting import wait_for
-from tests.explorer.logs.test_pour_log import poses
+from tests.explorer.recordings.test_pour_log import poses
 from tests.explorer.viewer.person import Person
 
 

@@ -13,7 +13,7 @@ from doe.studies.exclusion import ExcludedRun
 from doe.studies.study import load_study
 from doe.studies.study_result import study_from
 from explorer.background.command_process import HERE, CommandStatus, PourPlace
-from explorer.background.progress import StageProgress, TriedRun
+from explorer.background.events import StageProgress, TriedRun
 from explorer.errors import CommandError
 from explorer.report.sections.answer import banner as study_banner
 from explorer.report.study_charts import Plot

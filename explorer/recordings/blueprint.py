@@ -73,7 +73,7 @@ def blueprint(eye_distance: float) -> rrb.Blueprint:
 def answer_blueprint(
     eye_distance: float, models: Sequence[str], measured_pile: bool, outlines: bool, errors: Sequence[str]
 ) -> rrb.Blueprint:
-    """Layout of an answer (`explorer.logs.answer_recording`): piles side by side, all seen from the same place.
+    """Layout of an answer (`explorer.recordings.answer_recording`): piles side by side, all seen from the same place.
 
     ``models``: entities of the pours; ``outlines``, ``errors``: which charts there are.
     """

@@ -13,7 +13,7 @@ import pytest
 
 from explorer.live.frames import MAX_BODIES
 from explorer.live.messages import SessionState
-from explorer.session import SPEED_RANGE, Session, SessionError
+from explorer.live.session import SPEED_RANGE, Session, SessionError
 from solver.params import ParameterError
 from solver.pours.record import Outcome, Phase
 from solver.scenes.scene import value, with_values
@@ -265,7 +265,7 @@ def test_closing_ends_the_process(session):
 def test_the_solver_ends_when_its_parent_is_killed():
     program = (
         "import time\n"
-        "from explorer.session import Session\n"
+        "from explorer.live.session import Session\n"
         "from tests.explorer.beads import bead_scene\n"
         "if __name__ == '__main__':\n"
         "    session = Session()\n"
@@ -282,7 +282,7 @@ def test_the_solver_ends_when_its_parent_is_killed():
 
 
 def test_the_page_process_never_loads_taichi():
-    program = "import sys, explorer.viewer.app, explorer.session; print('taichi' in sys.modules)"
+    program = "import sys, explorer.viewer.app, explorer.live.session; print('taichi' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
 

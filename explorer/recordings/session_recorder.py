@@ -10,10 +10,10 @@ from pathlib import Path
 from explorer.files.output_file import check_new_file
 from explorer.live.frames import Frame
 from explorer.live.messages import SessionState, Status
-from explorer.logs.blueprint import motion_curves
-from explorer.logs.pour_log import PourLog
-from explorer.logs.recording import FRAME_INTERVAL, RecordedPour, RunningViewer
 from explorer.outcomes import outcome_text
+from explorer.recordings.blueprint import motion_curves
+from explorer.recordings.pour_log import PourLog
+from explorer.recordings.recording import FRAME_INTERVAL, RecordedPour, RunningViewer
 from explorer.scene.source import differences
 from solver.scenes.scene import Scene
 

@@ -3,7 +3,7 @@
     answer                          Markdown: the answer, what is shown, and every error as a number
     measured/world/…                the measured surface as a mesh, and the plate; measured/words: what it is
     measured/curves/<plot>/<name>   the measured angle from end to end, and the discharge where it was weighed
-    <model>/…                       one pour of each model as `explorer.logs.pour_log` writes it, all from time 0
+    <model>/…                       one pour of each model as `explorer.recordings.pour_log` writes it, all from time 0
     outlines/<name>                 height over the distance from the pile's middle [mm], mean and ± 1 SD between pours;
                                     heights are negative, for the viewer's axis points down
     errors/<data>/<before|…>        before, after, noise: a bar per observable in multiples of the noise, in the order
@@ -33,16 +33,15 @@ from doe.run_records import Run, sample_of
 from doe.studies.study_result import StudyResult
 from explorer.diagnosis.piles import HeightSurface, answer_piles
 from explorer.diagnosis.result import DiagnosisResult
-from explorer.logs.blueprint import CURVES, TIMELINE, Curve, answer_blueprint, curve_entity
-from explorer.logs.pour_log import EYE, PLATE_COLOUR, PourLog, mesh, opened
-from explorer.logs.pour_recorder import FollowedPour
 from explorer.outcomes import outcome_text
+from explorer.recordings.blueprint import CURVES, TIMELINE, Curve, answer_blueprint, curve_entity
+from explorer.recordings.pour_log import EYE, PLATE_COLOUR, PourLog, mesh, opened
+from explorer.recordings.pour_recorder import FollowedPour
 from explorer.report.content import Banner
 from explorer.report.diagnosis.answer import banner as diagnosis_banner
 from explorer.report.diagnosis.wording import feature_label, feature_value
 from explorer.report.sections.answer import banner as study_banner
 from explorer.scene.meshes import PLATE_NAME, Triangles, rig_triangles, scene_height
-from explorer.study.run import REFERENCE
 from explorer.study.runs import scene_of
 from explorer.units import observable_label, observed
 from explorer.viewer.palette import BODY_COLOURS, MEASURED, STILL
@@ -169,9 +168,8 @@ def diagnosis_answer(result: DiagnosisResult) -> Answer:
 
 def study_answer(result: StudyResult) -> Answer:
     """What there is to record of a calibration."""
-    reference = [run for run in result.own_runs_of("pilot") if run.label == REFERENCE]
     poured: dict[str, tuple[str, Sequence[Run]]] = {
-        DECLARED: ("pilot", reference),
+        DECLARED: ("pilot", result.reference_runs()),
         OPTIMUM: ("verification", result.own_runs_of("verification")),
     }
     scenes = {name: scene_of(result, stage, runs[0]) for name, (stage, runs) in poured.items() if runs}
@@ -196,7 +194,7 @@ def study_answer(result: StudyResult) -> Answer:
             "targets": [
                 ErrorBar(
                     observable_label(target.observable),
-                    abs(sample_of(reference, target.observable).mean - target.mean),
+                    abs(sample_of(result.reference_runs(), target.observable).mean - target.mean),
                     abs(test.simulated.mean - target.mean),
                     test.simulated.sd if target.sd is None else target.sd,
                     partial(observed, target.observable),

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from explorer.live.messages import SessionState, Status
-from explorer.logs.recording import RunningViewer
-from explorer.logs.recording_reader import read_recording
-from explorer.logs.session_recorder import SessionRecorder
+from explorer.recordings.recording import RunningViewer
+from explorer.recordings.recording_reader import read_recording
+from explorer.recordings.session_recorder import SessionRecorder
 from explorer.scene.source import material_source
 from explorer.viewer.guarded_server import free_port
 from tests.explorer.viewer.page_session import frame_of

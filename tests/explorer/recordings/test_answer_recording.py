@@ -14,7 +14,7 @@ from doe.declared.model import effect_values
 from doe.measurement.load import load_measurement
 from doe.studies.study import load_study, with_profile
 from explorer.errors import CommandError
-from explorer.logs.recording_reader import read_recording
+from explorer.recordings.recording_reader import read_recording
 from explorer.report import folder as report_folder
 from explorer.study import run as study_run
 from explorer.viewer.actions import Actions
@@ -25,7 +25,7 @@ from solver.observables import observe
 from tests.explorer import diagnosed
 from tests.explorer.background.waiting import wait_for
 from tests.explorer.command_line import explorer, refused
-from tests.explorer.logs.test_pour_log import rows
+from tests.explorer.recordings.test_pour_log import rows
 from tests.explorer.study.test_run import Formula
 from tests.explorer.viewer.page_session import event, finished, page_context
 from tests.explorer.viewer.person import Browser
@@ -167,7 +167,7 @@ def test_it_opens_side_by_side(answered):
 
 
 def test_where_nothing_is_added_one_model_is_poured(answered, result):
-    from explorer.logs.answer_recording import diagnosis_answer
+    from explorer.recordings.answer_recording import diagnosis_answer
 
     answer = diagnosis_answer(replace(result, final="base", maps=(), piles=()))
     assert list(answer.models) == ["calibrated"]

@@ -9,7 +9,7 @@
     scene                       the scene at the beginning, as the text of a material file
 
 Timelines: ``sim_time`` [s] and ``step``. Poses are single precision: an f32 position of 0.1 m resolves 7 nm.
-A recording of several pours has each of them below an entity of its own (`explorer.logs.answer_recording`).
+A recording of several pours has each of them below an entity of its own (`explorer.recordings.answer_recording`).
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ import rerun.blueprint as rrb
 
 from explorer.files.output_file import check_new_file
 from explorer.files.run_result import parameter_values, versions
-from explorer.logs.blueprint import CURVES, TIMELINE, blueprint, curve_entity
-from explorer.logs.recording import RunningViewer
+from explorer.recordings.blueprint import CURVES, TIMELINE, blueprint, curve_entity
+from explorer.recordings.recording import RunningViewer
 from explorer.scene.meshes import (
     GATE_NAME,
     PLATE_NAME,

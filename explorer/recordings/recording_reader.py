@@ -17,8 +17,8 @@ import pyarrow as pa  # type: ignore[import-untyped]
 from rerun.chunk import RrdReader
 
 from explorer.errors import CommandError
-from explorer.logs.blueprint import CURVES, TIMELINE, curve_entity
-from explorer.logs.recording import (
+from explorer.recordings.blueprint import CURVES, TIMELINE, curve_entity
+from explorer.recordings.recording import (
     BODIES,
     NOBODY,
     WORLD,
@@ -29,7 +29,7 @@ from explorer.logs.recording import (
     Shape,
     index_at,
 )
-from explorer.logs.replay import check_recording
+from explorer.recordings.replay import check_recording
 from solver.scenes.material_file import scene_from
 from solver.scenes.scene import Scene
 

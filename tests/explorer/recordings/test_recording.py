@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from explorer.errors import CommandError
-from explorer.logs.pour_log import PourLog
-from explorer.logs.recording_reader import _scene, read_recording
+from explorer.recordings.pour_log import PourLog
+from explorer.recordings.recording_reader import _scene, read_recording
 from explorer.scene.file import load_scene, with_settings
 from explorer.scene.meshes import body_triangles, rig_poses
 from explorer.scene.text import material_toml
 from explorer.viewer.palette import BODY_COLOURS
 from solver import with_values
 from solver.observables import Value
-from tests.explorer.logs.test_pour_log import QUARTER_TURN, poses
+from tests.explorer.recordings.test_pour_log import QUARTER_TURN, poses
 
 
 @pytest.fixture(scope="module")

@@ -13,11 +13,11 @@ from rerun.chunk import RrdReader
 
 from explorer.live.frames import Frame
 from explorer.live.messages import SessionState, Status
-from explorer.logs.pour_log import PourLog
-from explorer.logs.pour_recorder import recorder_of
-from explorer.logs.recording import RecordedPour, recorded_lines
-from explorer.logs.recording_reader import read_recording
-from explorer.logs.session_recorder import SessionRecorder
+from explorer.recordings.pour_log import PourLog
+from explorer.recordings.pour_recorder import recorder_of
+from explorer.recordings.recording import RecordedPour, recorded_lines
+from explorer.recordings.recording_reader import read_recording
+from explorer.recordings.session_recorder import SessionRecorder
 from explorer.scene.file import load_scene, with_settings
 from explorer.scene.meshes import rig_poses
 from solver import Job, Outcome, Phase, Scene, run_pours, with_values
@@ -196,8 +196,8 @@ def test_a_curve_has_gaps_where_nothing_was_measured(scene, tmp_path):
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from explorer.logs.pour_log import PourLog
-from tests.explorer.logs.test_pour_log import poses
+from explorer.recordings.pour_log import PourLog
+from tests.explorer.recordings.test_pour_log import poses
 from explorer.scene.file import load_scene
 log = PourLog(Path(sys.argv[1]), load_scene("funnel"), seed=1)
 for k in range(20):

@@ -13,10 +13,10 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from explorer.files.output_file import check_new_file
-from explorer.logs.blueprint import motion_curves
-from explorer.logs.pour_log import PourLog
-from explorer.logs.recording import FRAME_INTERVAL, RecordedPour
 from explorer.outcomes import outcome_text
+from explorer.recordings.blueprint import motion_curves
+from explorer.recordings.pour_log import PourLog
+from explorer.recordings.recording import FRAME_INTERVAL, RecordedPour
 from solver import Outcome, Record
 from solver.observables import observe
 from solver.observables.pile import angle_of_repose

@@ -6,7 +6,7 @@ from rerun.chunk import RrdReader
 from doe.pour_runner import PourRunner
 from doe.run_records import Setting
 from doe.store import Store
-from explorer.logs.pour_recorder import StudyRecorder
+from explorer.recordings.pour_recorder import StudyRecorder
 from solver import load_material, with_values
 from tests.explorer.command_line import TINY
 

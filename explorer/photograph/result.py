@@ -1,0 +1,146 @@
+"""What was read off photographs of piles: as it is in memory, and as ``photograph.json`` keeps it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from scipy import stats
+
+from doe.provenance import About
+from doe.record import Document, Record
+from explorer.files.run_result import made_today, versions
+from explorer.photograph.simulated import SimulatedPiles
+from solver.photograph import Board, PhotographedPile, Refusal
+from solver.photograph.reading_error import COVERAGE
+
+MOST_POINTS = 500
+"""Of an outline."""
+BASES = {
+    "plate": "the plate beside the pile",
+    "foot": "the foot of the pile",
+    "given": "--baseline",
+    "support": "the top of what is under the pile",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredPhotographs:
+    """What came out, in the order of the pictures."""
+
+    readings: tuple[PhotographedPile | Refusal, ...]
+    simulated: SimulatedPiles | None
+    board: Board | None = None
+    """The checkerboard that told the lens."""
+
+    @property
+    def piles(self) -> tuple[PhotographedPile, ...]:
+        """Of the pictures that show one."""
+        return tuple(reading for reading in self.readings if isinstance(reading, PhotographedPile))
+
+    @property
+    def refusals(self) -> tuple[Refusal, ...]:
+        """Of the others."""
+        return tuple(reading for reading in self.readings if isinstance(reading, Refusal))
+
+
+@dataclass(frozen=True)
+class ReadPile(Record):
+    """A pile on a picture; lengths in ``unit`` ("m" or "px"), angles [°], each with half its 95 % interval."""
+
+    name: str
+    unit: str
+    left: tuple[float, float]
+    right: tuple[float, float]
+    mean: tuple[float, float]
+    height: float
+    half_width: float
+    u: tuple[float, ...]
+    z: tuple[float, ...]
+    """The outline over the base line."""
+    left_thirds: tuple[float, ...] = ()
+    right_thirds: tuple[float, ...] = ()
+    """Angles of the lower, the middle and the upper third of the fit [°]."""
+    lens: float = 0.0
+    """k of the lens that was taken out of the picture; 0: none."""
+    checkerboard: str = ""
+    """Name of the picture that told the lens; empty: the base line told it."""
+    size: tuple[int, int] = (0, 0)
+    """Of the picture [px]: columns, rows."""
+    pixel: float = 0.0
+    """Length of a pixel in ``unit``."""
+    base: tuple[float, float] = (math.nan, math.nan)
+    """y of the base line at the left and the right edge of the picture [px]."""
+    base_error: float = math.nan
+    """Standard error of its height [px]."""
+    base_from: str = ""
+    """What the base line was found by, in words."""
+    parts: dict[str, float] = field(default_factory=dict)
+    """Source → its standard error of the mean angle [°]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhotographResult(Document):
+    """What was read off photographs: the content of ``photograph.json``. ``refused``: picture → why it has no angle."""
+
+    SCHEMA: ClassVar[int] = 1
+    NAME: ClassVar[str] = "photograph.json"
+
+    kind: str = "photograph"
+    piles: tuple[ReadPile, ...]
+    refused: dict[str, str]
+    versions: dict[str, str | None]
+    about: About = field(default_factory=About)
+    simulated: str = ""
+    """What was poured beside it, if anything."""
+
+    @property
+    def over_pictures(self) -> tuple[float, float, float]:
+        """Mean over the pictures, SD, and half the 95 % interval of the mean (Student's t) [°]; NaN below two."""
+        means = np.array([pile.mean[0] for pile in self.piles])
+        if means.size < 2:
+            return (float(means[0]) if means.size else math.nan), math.nan, math.nan
+        sd = float(means.std(ddof=1))
+        return float(means.mean()), sd, float(stats.t.ppf(0.975, means.size - 1)) * sd / math.sqrt(means.size)
+
+
+def photograph_result(measured: MeasuredPhotographs, author: str, notes: str) -> PhotographResult:
+    """The record of what was measured."""
+    return PhotographResult(
+        piles=tuple(_read(one, measured.board) for one in measured.readings if isinstance(one, PhotographedPile)),
+        refused={one.name: f"{one.reason}: {one.detail}" for one in measured.readings if isinstance(one, Refusal)},
+        versions=versions(),
+        about=made_today(author, notes),
+        simulated=measured.simulated.source if measured.simulated else "",
+    )
+
+
+def _read(pile: PhotographedPile, board: Board | None) -> ReadPile:
+    step = max(1, -(-pile.outline.u.size // MOST_POINTS))
+    left, right, mean = (
+        (one.value_deg, COVERAGE * one.error_deg) for one in (pile.angles.left, pile.angles.right, pile.angles.mean)
+    )
+    ends = pile.base.at(np.array([0.0, pile.size[0] - 1.0]))
+    return ReadPile(
+        pile.name,
+        pile.unit,
+        left,
+        right,
+        mean,
+        pile.height,
+        pile.half_width,
+        tuple(pile.outline.u[::step].tolist()),
+        tuple(pile.outline.top[::step].tolist()),
+        pile.angles.left.thirds_deg,
+        pile.angles.right.thirds_deg,
+        pile.lens,
+        "" if board is None else board.name,
+        size=pile.size,
+        pixel=pile.pixel,
+        base=(float(ends[0]), float(ends[1])),
+        base_error=pile.base.offset_error,
+        base_from=BASES[pile.base.kind],
+        parts=dict(pile.angles.mean.parts_deg),
+    )

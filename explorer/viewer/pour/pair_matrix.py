@@ -1,0 +1,143 @@
+"""The matrix of one parameter of all pairs of materials: what the solver has in force, and a box for every pair.
+
+viser has no table of inputs: a row of the lower triangle is a vector of up to three boxes, and longer rows take
+several.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import viser
+
+from explorer.units import InputError, checked, quantity, screen_unit, title
+from explorer.viewer.actions import Post
+from explorer.viewer.pour.live_sliders import HANDS_OFF, LINEAR_STEP, Apply, screen_range
+from explorer.viewer.view import small_html
+from solver.params import Parameter, declared
+from solver.scenes.material import Pair
+from solver.scenes.scene import Scene, value
+
+BOXES = 3
+"""Most boxes in a row: viser's longest vector."""
+
+
+class PairMatrix:
+    """The matrix of the parameter ``name`` in a folder of its own."""
+
+    def __init__(self, gui: viser.GuiApi, scene: Scene, name: str, post: Post, apply: Apply) -> None:
+        self._name, self._apply = name, apply
+        self._parameter = declared(Pair, "pair")[f"pair.{name}"]
+        with gui.add_folder(f"{title(self._parameter)} of every pair (acts now)", expand_by_default=False):
+            self._table = gui.add_html(matrix_html(scene, self._parameter, name))
+            self._rows = [self._row(gui, scene, one, others) for one, others in triangle(scene)]
+        for row in self._rows:
+            self._listen(row, post)
+
+    def follow(self, scene: Scene) -> None:
+        """Show the solver's values, but not in a row that a person is at."""
+        html = matrix_html(scene, self._parameter, self._name)
+        if self._table.content != html:
+            self._table.content = html
+        for row in self._rows:
+            numbers = self._numbers(scene, row.paths)
+            if time.monotonic() < row.touched + HANDS_OFF or entries(row.handle.value) == numbers:
+                continue
+            row.shown, row.handle.value = numbers, numbers if len(numbers) > 1 else numbers[0]
+
+    def _row(self, gui: viser.GuiApi, scene: Scene, one: str, others: tuple[str, ...]) -> PairRow:
+        paths = tuple(f"pair.{one}.{other}.{self._name}" for other in others)
+        numbers, (low, high) = self._numbers(scene, paths), screen_range(self._parameter)
+        hint = f"{one} with {', '.join(others)}. {self._parameter.doc}"
+        if len(numbers) == 1:
+            return PairRow(
+                gui.add_number(one, numbers[0], min=low, max=high, step=LINEAR_STEP, hint=hint), paths, numbers
+            )
+        add: Any = gui.add_vector2 if len(numbers) == 2 else gui.add_vector3
+        ends = {"min": (low,) * len(numbers), "max": (high,) * len(numbers)}
+        return PairRow(add(one, numbers, **ends, step=LINEAR_STEP, hint=hint), paths, numbers)
+
+    def _numbers(self, scene: Scene, paths: tuple[str, ...]) -> tuple[float, ...]:
+        return tuple(screen_unit(self._parameter).to_screen(float(value(scene, path))) for path in paths)
+
+    def _listen(self, row: PairRow, post: Post) -> None:
+        def entered(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is None:  # set by follow(), not by a person
+                return
+            row.touched = time.monotonic()
+            sent = event.target.value
+            post(lambda: self._take(row, sent))
+
+        row.handle.on_update(entered)
+
+    def _take(self, row: PairRow, sent: object) -> None:
+        """Set those pairs of a row whose box shows another number than before."""
+        low, high = screen_range(self._parameter)
+        numbers = tuple(checked(number, low, high, title(self._parameter)) for number in entries(sent))
+        if len(numbers) != len(row.paths):
+            raise InputError(f"{title(self._parameter)}: {len(row.paths)} numbers are needed, not {len(numbers)}")
+        unit = screen_unit(self._parameter)
+        found = zip(row.paths, numbers, row.shown, strict=True)
+        changed: dict[str, float | str] = {path: unit.to_si(new) for path, new, old in found if new != old}
+        row.shown = numbers
+        if changed:
+            self._apply(changed)
+
+
+@dataclass
+class PairRow:
+    """Boxes for the pairs of one material with some others."""
+
+    handle: Any
+    paths: tuple[str, ...]
+    shown: tuple[float, ...]
+    """What the boxes showed last, in the unit of the screen."""
+    touched: float = -math.inf
+    """Moment of a person's last input [s]."""
+
+
+def pair_parameters() -> tuple[str, ...]:
+    """Names of what pairs have, each with a matrix of its own."""
+    return tuple(path.partition(".")[2] for path, parameter in declared(Pair, "pair").items() if parameter.live)
+
+
+def entries(sent: object) -> tuple[Any, ...]:
+    """What boxes hold, one or several."""
+    return tuple(sent) if isinstance(sent, (tuple, list)) else (sent,)
+
+
+def names_in_pairs(scene: Scene) -> tuple[str, ...]:
+    """Materials (or bodies) that pairs name, in order of appearance."""
+    return tuple(dict.fromkeys(name for pair in scene.pairs for name in (pair.a, pair.b)))
+
+
+def triangle(scene: Scene) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Rows of the lower triangle: a name, and up to ``BOXES`` names that it has a pair with; none is left out."""
+    names = names_in_pairs(scene)
+    for k, one in enumerate(names):
+        others = [other for other in names[: k + 1] if _pair(scene, one, other) is not None]
+        for first in range(0, len(others), BOXES):
+            yield one, tuple(others[first : first + BOXES])
+
+
+def matrix_html(scene: Scene, parameter: Parameter, name: str) -> str:
+    """The whole matrix as the solver has it; a dash where there is no such pair."""
+    names = names_in_pairs(scene)
+    style = "style='padding:0 0.5em; text-align:right; font-variant-numeric:tabular-nums'"
+    head = "".join(f"<th {style}>{escape(other)}</th>" for other in names)
+    rows = []
+    for one in names:
+        pairs = (_pair(scene, one, other) for other in names)
+        cells = ("–" if pair is None else quantity(getattr(pair, name), parameter.unit) for pair in pairs)
+        rows.append(f"<tr><th {style}>{escape(one)}</th>{''.join(f'<td {style}>{cell}</td>' for cell in cells)}</tr>")
+    table = f"<table><tr><th></th>{head}</tr>{''.join(rows)}</table>"
+    return small_html(f"In the solver:<div style='overflow-x:auto; overflow-wrap:normal'>{table}</div>")
+
+
+def _pair(scene: Scene, one: str, other: str) -> Pair | None:
+    return next((pair for pair in scene.pairs if pair.joins(one, other)), None)
