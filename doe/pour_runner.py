@@ -77,7 +77,7 @@ class PourRunner:
     ``tries`` seeds are tried for one replicate. ``seeds`` are those of the replicates, of which then none is replaced;
     None: a stream of its own for every run (:func:`seed_of`). ``experiments``: the scenes of the study's further
     experiments by name. Pours run in this process, where ``observer`` can watch
-    them, or as ``pours`` says (``solver.Executor.run_queue``).
+    them, or as ``pours`` says (``solver.Executor.run_queue``); ``watched`` looks on at how either ends.
     """
 
     def __init__(
@@ -93,11 +93,12 @@ class PourRunner:
         tries: int = TRIES,
         seeds: Sequence[int] | None = None,
         experiments: Mapping[str, Scene] | None = None,
+        watched: Callable[[Pours], Pours] = lambda pours: pours,
     ) -> None:
         self._scenes = {"": scene, **(experiments or {})}
         self._store, self._study, self._seed = store, study, study_seed
         self._threads, self._on_run, self._observer = threads, on_run, observer
-        self._pours, self._seeds = pours, seeds
+        self._pours, self._seeds, self._watched = pours, seeds, watched
         self._tries = tries if seeds is None else 1
 
     def run(self, stage: str, settings: Sequence[Setting]) -> list[list[Run]]:
@@ -161,7 +162,7 @@ class PourRunner:
         while ended:
             yield ended.popleft()
         if queue:
-            for job, record in (self._pours or here)(queue, list(scenes.values())):
+            for job, record in self._watched(self._pours or here)(queue, list(scenes.values())):
                 row, experiment, replicate, attempt, key = places[job.tag]
                 if self._observer is not None:
                     self._observer.finish(stage, job.seed, record)

@@ -131,7 +131,11 @@ class Store:
         with self._told():
             path.parent.mkdir(parents=True, exist_ok=True)
             self._db = sqlite3.connect(path, timeout=60.0)
-            self._table = self._opened()
+            try:
+                self._table = self._opened()
+            except BaseException:
+                self._db.close()
+                raise
         if pouring and self.physics != PHYSICS:
             self.close()
             raise StoreError(

@@ -145,7 +145,12 @@ def _done_by_a_copy(work: Callable[[], object]) -> bool:
     with warnings.catch_warnings():
         # Python 3.12 counts the idle threads of Taichi's compiler, which the copy has no use for.
         warnings.simplefilter("ignore", DeprecationWarning)
-        copy = os.fork()
+        try:
+            copy = os.fork()
+        except OSError:  # no memory or no room for one more process: keeping kernels is not worth a pour
+            os.close(reading)
+            os.close(writing)
+            return False
     if copy == 0:
         failed = 1
         try:

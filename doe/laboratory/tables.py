@@ -171,8 +171,8 @@ def read_table(path: Path, layout: Layout) -> Table:
     for line, cells in readings:
         if len(cells) != len(header):
             raise LaboratoryError(
-                f"{path}, row {line}: {len(cells)} cells; allowed: {len(header)}, one per column (between commas, "
-                "decimals with a point)"
+                f"{path}, row {line}: {len(cells)} cells; allowed: {len(header)}, one per column (with decimal commas "
+                "the cells are divided by semicolons or tabs)"
             )
         by_line.append((line, dict(zip(header, cells, strict=True))))
     if not by_line:

@@ -27,7 +27,7 @@ def calibrate(
         metavar="FILE.rrd|DIR",
         help="New recording of the piles, a finished OUT is only recorded; or a folder for all verification pours.",
     ),
-    threads: int | None = typer.Option(None, min=1, help="CPU threads; all if not given."),
+    threads: int | None = typer.Option(None, min=1, help="Pours at the same time; one per core if not given."),
     scheduler: str = typer.Option("", metavar="tcp://…", help="Pour on the workers of this Dask scheduler."),
     tries: int = typer.Option(3, min=1, max=20, help="Seeds tried for one replicate that gives no valid pour."),
     beyond_reach: bool = typer.Option(

@@ -45,7 +45,7 @@ def simulate(
     set_: list[str] = typer.Option([], "--set", metavar="PATH=VALUE", help="Set a parameter; may be repeated."),
     seed: int = typer.Option(1, min=0, help="Seed of the first pour."),
     replicates: int = typer.Option(1, min=1, max=10_000, help="Number of pours, with seeds SEED, SEED + 1, …"),
-    threads: int | None = typer.Option(None, min=1, help="CPU threads; all by default."),
+    threads: int | None = typer.Option(None, min=1, help="Pours at the same time; one per core if not given."),
     scheduler: str = typer.Option("", metavar="tcp://…", help="Pour on the workers of this Dask scheduler."),
     out: Path | None = typer.Option(None, help="New folder for result.json, curves, piles and parameters."),
     record: Path | None = typer.Option(

@@ -30,7 +30,8 @@ from doe.measurement.parameter_table import read_parameters
 from doe.record import plain
 from doe.table_file import read_table, read_text
 from explorer.errors import CommandError
-from explorer.files.output_file import check_vacant, write_whole
+from explorer.files.output_file import write_whole
+from explorer.files.run_folder import appearing
 from explorer.report.diagnosis.wording import spelled
 from explorer.scene.text import toml_key, toml_value
 from explorer.units import code, enumeration, number, parameter_label, parameter_value, percent
@@ -87,7 +88,6 @@ def write_next(
     # It brings the solver's kernels along; whoever only writes a measurement's file needs none.
     from doe.diagnose.candidate_experiments import as_suggested
 
-    check_vacant(folder, option="")
     table = read_toml(source / FILE)
     condition = next(one for one in measurement.conditions if one.name == suggestion.condition)
     stated = next(one for one in table["condition"] if one["name"] == condition.name)
@@ -95,24 +95,26 @@ def write_next(
     changed = as_suggested(condition, suggestion).scene
     entry = _changed_entry(stated, name, measurement, suggestion, changed)
     title = f"{measurement.title or source.name}: follow-up, {change}"
-    folder.mkdir(parents=True, exist_ok=True)
-    material = copied_material(str(stated.get("material", table["material"])), source, folder)
-    top = {"format": 1, "title": title, "material": material}
-    tables = {"parameters": _parameters(table, measurement), "uncertainty": _uncertainty(table, condition)}
-    write_whole(folder / FILE, measurement_toml(top, tables, entry))
-    write_whole(folder / f"{name}.csv", _empty_table(condition, suggestion.pours))
-    if any(one.surfaces for one in measurement.conditions):
-        (folder / "scans").mkdir()
-        files = f"{name}_1.ply … {name}_{suggestion.pours}.ply"
-        unit = f"in metres, or with unit under [condition.scan] in {FILE}"
-        write_whole(folder / "scans/README.txt", f"A scan of each pile: {files} (or .stl, .xyz, .npz, .tif), {unit}.\n")
-    drawing = setup_svg(changed, suggestion.values)
-    if drawing:
-        write_whole(folder / "setup.svg", drawing)
-    write_whole(folder / "README.md", _readme(folder, source, measurement, suggestion, name, given))
-    order = {"schema": SCHEMA, "rivals": suggestion.rivals, "change": change, "values": suggestion.values}
-    order |= {"turned": suggestion.turned, "condition": condition.name, "source": str(source.absolute())}
-    write_whole(folder / ORDER, json.dumps(plain(order), ensure_ascii=False, indent=1) + "\n")
+    drawing, scanned = setup_svg(changed, suggestion.values), any(one.surfaces for one in measurement.conditions)
+    with appearing(folder, option="") as made:
+        material = copied_material(str(stated.get("material", table["material"])), source, made)
+        top = {"format": 1, "title": title, "material": material}
+        tables = {"parameters": _parameters(table, measurement), "uncertainty": _uncertainty(table, condition)}
+        write_whole(made / FILE, measurement_toml(top, tables, entry))
+        write_whole(made / f"{name}.csv", _empty_table(condition, suggestion.pours))
+        if scanned:
+            (made / "scans").mkdir()
+            files = f"{name}_1.ply … {name}_{suggestion.pours}.ply"
+            unit = f"in metres, or with unit under [condition.scan] in {FILE}"
+            told = f"A scan of each pile: {files} (or .stl, .xyz, .npz, .tif), {unit}.\n"
+            write_whole(made / "scans/README.txt", told)
+        if drawing:
+            write_whole(made / "setup.svg", drawing)
+        readme = _readme(folder, source, measurement, suggestion, name, given, bool(drawing), scanned)
+        write_whole(made / "README.md", readme)
+        order = {"schema": SCHEMA, "rivals": suggestion.rivals, "change": change, "values": suggestion.values}
+        order |= {"turned": suggestion.turned, "condition": condition.name, "source": str(source.absolute())}
+        write_whole(made / ORDER, json.dumps(plain(order), ensure_ascii=False, indent=1) + "\n")
 
 
 def read_next(folder: Path) -> NextFolder:
@@ -310,7 +312,14 @@ def _empty_table(condition: Condition, pours: int) -> str:
 
 
 def _readme(
-    folder: Path, source: Path, measurement: Measurement, suggestion: Suggestion, name: str, given: Path | None
+    folder: Path,
+    source: Path,
+    measurement: Measurement,
+    suggestion: Suggestion,
+    name: str,
+    given: Path | None,
+    drawn: bool,
+    scanned: bool,
 ) -> str:
     experiment, pours = suggestion.experiment, suggestion.pours
     condition = next(one for one in measurement.conditions if one.name == suggestion.condition)
@@ -321,8 +330,8 @@ def _readme(
         settings.append(f"- the whole rig, plate and funnel: **turned by 180° on its bench**; {TURNED_FRAME}")
     until = condition.scene.numerics.duration
     reading = f" Read each pile {number(until)} s after the first body entered, at rest or not." if until > 0.0 else ""
-    drawing = " `setup.svg` shows it to scale, what changes in colour." if (folder / "setup.svg").is_file() else ""
-    more = f", and a scan of each pile as `scans/{name}_1.ply` and so on" if (folder / "scans").is_dir() else ""
+    drawing = " `setup.svg` shows it to scale, what changes in colour." if drawn else ""
+    more = f", and a scan of each pile as `scans/{name}_1.ply` and so on" if scanned else ""
     if any(one.origin == "photographs" for one in condition.observations):
         more += f', or name photographs under `[[condition]]` in `{FILE}`: `images = ["…"]`'
     command = ["explorer", "diagnose", str(source.absolute()), "--follow-up", str(folder.absolute())]

@@ -30,7 +30,7 @@ from explorer.background.output_folder import kept_for_one, read_result
 from explorer.background.progress import PourProgress
 from explorer.background.reporter import Reporter
 from explorer.diagnosis.corrected import corrected_toml, study_toml
-from explorer.diagnosis.next_folder import read_next, write_next
+from explorer.diagnosis.next_folder import ORDER, read_next, write_next
 from explorer.diagnosis.result import (
     CORRECTED,
     CORRECTED_STUDY,
@@ -198,9 +198,13 @@ def _run(
     if missing:
         say(missing)
     if found.suggestions:
-        joined_names = [condition.name for condition in found.conditions]
-        write_next(order.out / "next", order.folder, as_declared, found.suggestions[0], order.given, joined_names)
-        say(f"{order.out}/next: what to measure next, to be filled in; then --follow-up {order.out}/next")
+        following = order.out / "next"
+        if (following / ORDER).is_file():  # of a run that was stopped later, or one that is gone on with
+            say(f"{following}: is there already and stays as it is, for somebody may have filled it in")
+        else:
+            joined_names = [condition.name for condition in found.conditions]
+            write_next(following, order.folder, as_declared, found.suggestions[0], order.given, joined_names)
+            say(f"{following}: what to measure next, to be filled in; then --follow-up {following}")
     if order.apply:
         write_whole(order.out / CORRECTED, corrected_toml(measurement, found))
         say(f"{order.out}/{CORRECTED}: the corrected model, for every command that takes a material")

@@ -100,7 +100,7 @@ def _write(order: LabOrder, result: LabResult, part: dict[str, Any]) -> None:
             with appearing(order.report, "--report") as folder:
                 write_report(bench_report(found), folder, {found.NAME: json_text(found.to_dict()) + "\n"})
     if order.out:
-        order.out.write_text(part_file(result, part), encoding="utf-8")
+        write_whole(order.out, part_file(result, part))
 
 
 def part_file(result: LabResult, part: dict[str, Any]) -> str:

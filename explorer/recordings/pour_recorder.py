@@ -12,6 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+from explorer.errors import CommandError
 from explorer.files.output_file import check_new_file
 from explorer.outcomes import outcome_text
 from explorer.recordings.blueprint import motion_curves
@@ -128,8 +129,17 @@ def _angle_deg(pour: Pour) -> float:
     return angle_of_repose(PileReading(pile)).value
 
 
+def check_recordings(folder: Path, resume: bool) -> None:
+    """Refuse a ``folder`` with recordings of a verification, unless the study is gone on with."""
+    if not resume and (found := sorted(folder.glob(f"{RECORDED_STAGE}_*.rrd"))):
+        raise CommandError(f"--record {folder}: holds {found[0].name} already; name a folder without such recordings")
+
+
 class StudyRecorder:
-    """Observer of a study's pours that records those of the verification into ``folder``."""
+    """Observer of a study's pours that records those of the verification into ``folder``.
+
+    The file of a pour that is made anew, as of one that was cut off, is written anew.
+    """
 
     def __init__(self, folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -143,6 +153,7 @@ class StudyRecorder:
             return
         if seed not in self._recorders:
             path = self._folder / f"{RECORDED_STAGE}_{seed}.rrd"
+            path.unlink(missing_ok=True)
             self._recorders[seed] = self._stack.enter_context(recorder_of(path, [seed]))
         self._recorders[seed].sample(0, pour)
 

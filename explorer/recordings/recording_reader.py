@@ -52,9 +52,16 @@ def read_recording(path: Path, under: str = "") -> Recording:
     """
     check_recording(path)
     try:
-        found = _below(under, _columns(path))
-    except Exception as error:  # the reader raises several kinds for a file that is cut within a chunk
-        raise CommandError(f"{path}: cannot be read as a recording: {str(error).splitlines()[0]}") from None
+        return _recording(path, _below(under, _columns(path)))
+    except CommandError:
+        raise
+    except Exception as error:  # of several kinds: a file that is cut within a chunk, or that another program wrote
+        why = next(iter(str(error).splitlines()), type(error).__name__)
+        raise CommandError(f"{path}: cannot be read as a recording: {why}") from None
+
+
+def _recording(path: Path, found: Mapping[str, dict[str, _Rows]]) -> Recording:
+    """What the entities of ``path`` hold. Raises CommandError where they have no bodies."""
     components = tuple(_component(name, found[name]) for name in found if name.startswith(BODIES))
     surfaces = tuple(
         _surface(name, columns)

@@ -130,7 +130,7 @@ def _wait_for(address: str, server: subprocess.Popen[bytes]) -> None:
         try:
             _fetch(f"{address}/re_viewer.js")
             return
-        except urllib.error.URLError:
+        except OSError:  # refused, or reset while the server starts
             time.sleep(0.05)
     raise CommandError(f"rerun's web viewer does not start ({viewer_program()})")
 

@@ -109,6 +109,10 @@ def run_study(order: StudyOrder, reporter: Reporter) -> StudyResult:
     # The page puts these there before the start.
     own = [study.file, *([order.target] if order.target else [])]
     check_vacant(order.out, own=own, resume=order.resume)
+    if order.record is not None:
+        from explorer.recordings.pour_recorder import check_recordings
+
+        check_recordings(order.record, order.resume)
     # A recorder watches pours from within; all others run in processes of their own.
     apart = order.record is None and chosen() == "cpu"
     # The executor before anything is in the folder: perhaps no scheduler answers.
@@ -157,9 +161,10 @@ def _run(
             order.threads,
             on_run=ended,
             observer=recorder,
-            pours=None if recorder else reporter.watched(pours),
+            pours=None if recorder else pours,
             tries=order.tries,
             experiments=study.experiments,
+            watched=reporter.watched,
         )
         bias = estimator_bias(study.estimators)
         found = run_campaign(study, profile, runner, bias, progress.stage, follower.begin, partial.keep)

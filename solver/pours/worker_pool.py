@@ -108,6 +108,7 @@ class WorkerPool:
                     if isinstance(record, BaseException):
                         raise PourBrokeOff(job, record) from record
                     idle.append(pipe)
+                    losses.pop(id(job), None)  # a job that is appended later may get the number of this one
                     yield job, record
         finally:
             if busy:  # left before the end: what still runs is of no use

@@ -11,7 +11,7 @@ import trimesh
 from doe.pour_runner import TRIES, PourRunner, seed_of
 from doe.run_records import Run, Setting, no_pile_shares, responses
 from doe.store import Store, StoreError
-from solver import load_material, pour_key, with_rig, with_values
+from solver import load_material, pour_key, run_queue, with_rig, with_values
 from solver.observables import OBSERVABLES, Observable, Value
 from solver.rigs import Funnel
 from solver.shapes.solid import Solid
@@ -181,3 +181,23 @@ def test_a_mesh_that_is_changed_while_it_is_poured_ends_the_study(tmp_path):
         with pytest.raises(StoreError, match="stage, good: a mesh file was changed while it was poured; begin again"):
             PourRunner(scene, store, "test", 1, pours=changed).run("stage", [Setting("good", {}, 1)])
         assert list(store.runs()) == []
+
+
+@pytest.mark.usefixtures("taichi")
+@pytest.mark.parametrize("apart", [False, True], ids=["this process", "elsewhere"])
+def test_who_watches_sees_how_every_pour_ends(tmp_path, apart):
+    scene = with_values(load_material("sunflower_extract"), TINY)
+    seen = []
+
+    def watched(pours):
+        def run(queue, room):
+            for job, record in pours(queue, room):
+                seen.append((job.seed, str(record.outcome)))
+                yield job, record
+
+        return run
+
+    with closing(Store(tmp_path / "runs.sqlite")) as store:
+        runner = PourRunner(scene, store, "test", 1, pours=run_queue if apart else None, tries=1, watched=watched)
+        (runs,) = runner.run("pilot", [Setting("reference", {}, 2)])
+    assert sorted(seen) == sorted((run.seed, run.outcome) for run in runs)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from contextlib import ExitStack
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -83,7 +84,7 @@ class RecordingPanel(Panel):
                 raise CommandError("recording: a web page replays itself; download and open it")
             self._background.start(
                 "reading the recording",
-                lambda: [ReplayBeside(path, self._server.get_host(), self._server.token) for path in pours],
+                lambda: replays_beside(pours, self._server.get_host(), self._server.token),
                 self._show_replays,
             )
         elif chosen == DOWNLOAD and client is not None:
@@ -123,7 +124,11 @@ class ReplayBeside:
             guarded_server(host, 0, "Replay", WebPages("Replay", around=False), token=token),
             threading.Event(),
         )
-        page = ReplayPage(self._server, read, recording.name)
+        try:
+            page = ReplayPage(self._server, read, recording.name)
+        except BaseException:
+            self._server.stop()
+            raise
         self.address = f"http://{address(host)}:{self._server.get_port()}"
         self.seconds = float(read.times[-1]) - read.zero
         """How much it holds [s]."""
@@ -135,6 +140,17 @@ class ReplayBeside:
         self._stop.set()
         self._loop.join()
         self._server.stop()
+
+
+def replays_beside(recordings: Sequence[Path], host: str, token: str | None) -> list[ReplayBeside]:
+    """One for each of ``recordings``; none is left open where one of them cannot be read."""
+    with ExitStack() as stack:
+        replays = []
+        for path in recordings:
+            replays.append(ReplayBeside(path, host, token))
+            stack.callback(replays[-1].close)
+        stack.pop_all()
+    return replays
 
 
 def replay_links(replays: Sequence[ReplayBeside]) -> str:

@@ -66,7 +66,7 @@ class PopulationPanel(Panel):
 
     def __init__(self, page: PageContext) -> None:
         gui = page.server.gui
-        self._session, self._work = page.session, BackgroundWork(page.post)
+        self._session, self._post, self._work = page.session, page.post, BackgroundWork(page.post)
         self._process = PopulationProcess(page.data / "pours", page.diagnosis.store, place=page.place)
         self._doubt = AngleDoubt()
         self._scene: Scene | None = None
@@ -92,9 +92,9 @@ class PopulationPanel(Panel):
             self._scene, self._since = status.scene, wall
         command = self._process.status()
         if self._to_come is not None and not command.alive:
-            order, self._to_come = self._to_come, None
-            self._begin(*order)
-            command = self._process.status()
+            (scene, pours), self._to_come = self._to_come, None
+            # As an action, so that a refusal is told and ends nothing.
+            self._post(lambda: self._begin(scene, pours))
         if self._more.visible == command.alive:
             self._more.visible, self._stop.visible = not command.alive, command.alive
         no_draw = status.energy_put_in is not None or status.disturbed

@@ -254,3 +254,16 @@ def test_a_diagnosis_goes_on_from_another_one_to_its_files(tmp_path, asked):
     assert again.parameters == follow_up.parameters == measurement.parameters
     assert [value(one.scene, path) for one in follow_up.conditions] == [size]
     assert load_diagnosis(last).order.follow_up == str(tmp_path / "next")
+
+
+def test_a_diagnosis_gone_on_with_leaves_a_follow_up_that_is_filled_in(tmp_path, asked):
+    out = tmp_path / "first"
+    words = ("diagnose", str(SOURCE), "--out", str(out), "--store", str(tmp_path / "pours.sqlite"))
+    assert explorer(*words).exit_code == 0
+    fill(out / "next")
+    (table,) = (out / "next").glob("*.csv")
+    measured = table.read_text()
+    again = explorer(*words, "--resume")
+    assert again.exit_code == 0, again.stderr
+    assert f"{out}/next: is there already and stays as it is" in " ".join((again.stdout + again.stderr).split())
+    assert table.read_text() == measured

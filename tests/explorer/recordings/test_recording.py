@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import rerun as rr
 
 from explorer.errors import CommandError
 from explorer.recordings.pour_log import PourLog
@@ -135,3 +136,15 @@ def test_what_is_no_recording_is_refused_in_one_line(scene, tmp_path):
     with pytest.raises(CommandError, match=r"cut\.rrd: ") as refused:
         read_recording(tmp_path / "cut.rrd")
     assert "\n" not in str(refused.value)
+
+
+def test_a_recording_of_another_program_is_refused_in_one_line(tmp_path):
+    """Bodies where ours are, and no colour."""
+    stream = rr.RecordingStream("another_program")
+    stream.set_sinks(rr.FileSink(str(tmp_path / "other.rrd")))
+    stone = rr.Mesh3D(vertex_positions=np.eye(3), triangle_indices=[[0, 1, 2]])
+    stream.log("/world/bodies/stone", stone, static=True)
+    stream.flush()
+    stream.disconnect()
+    with pytest.raises(CommandError, match=r"^\S*other\.rrd: cannot be read as a recording: .+$"):
+        read_recording(tmp_path / "other.rrd")

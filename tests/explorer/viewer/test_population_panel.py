@@ -8,7 +8,7 @@ import pytest
 
 from doe.population import Comparison, Population
 from doe.store import Store
-from explorer.background.command_process import CommandStatus
+from explorer.background.command_process import BackgroundError, CommandStatus
 from explorer.live.messages import SessionState, Status
 from explorer.population.process import PopulationProcess
 from explorer.scene.source import material_source
@@ -168,7 +168,11 @@ def table(server, tmp_path, monkeypatch):
         panel.show(Now(session.now))
         return text(person.html)
 
-    yield SimpleNamespace(person=person, session=session, store=store, look=look, pours=made[0])
+    def refusal():
+        panel.show(Now(session.now))
+        return finished(actions, work)
+
+    yield SimpleNamespace(person=person, session=session, store=store, look=look, refusal=refusal, pours=made[0])
     panel.close()
     store.close()
 
@@ -241,6 +245,20 @@ def test_both_sides_of_a_change_are_poured_until_they_have_as_many(table):
         table.store.add(stored(SOURCE.scene, seed, 22.0))
     table.look()
     assert "against 8 former" in table.look()
+
+
+def test_a_second_order_that_is_refused_is_told_and_ends_nothing(table, monkeypatch):
+    table.look()
+    table.session.set_parameters({FRICTION: 0.2})
+    table.look()
+    assert table.person.press(POUR_BOTH) == ""
+
+    def full(scene, pours):
+        raise BackgroundError("No space left on device")
+
+    monkeypatch.setattr(table.pours, "start", full)
+    assert table.refusal() == "No space left on device"
+    assert table.person.labels == [POUR_BOTH]
 
 
 def test_cancelled_pours_of_the_one_side_are_not_followed_by_those_of_the_other(table):

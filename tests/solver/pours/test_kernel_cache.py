@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
@@ -76,6 +77,16 @@ def test_a_copy_that_hangs_is_ended(monkeypatch):
     assert not backend._done_by_a_copy(signal.pause)
     with pytest.raises(ChildProcessError):
         os.waitpid(copies[0], os.WNOHANG)
+
+
+def test_where_no_copy_can_be_made_a_pour_goes_on(monkeypatch):
+    def full():
+        raise BlockingIOError("no room for one more process")
+
+    monkeypatch.setattr(os, "fork", full)
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    assert not backend._done_by_a_copy(int)
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
 
 
 @pytest.mark.parametrize(("work", "done"), [(int, True), (lambda: 1 / 0, False)], ids=["done", "failed"])
