@@ -238,6 +238,11 @@ def code(text: str) -> str:
     return "`" + text.replace("`", "'") + "`"
 
 
+def term_text(term: str) -> str:
+    """A term of a model, or a source of variation, as it is read: "A*B^2" → "A × B²"."""
+    return term.replace("*", " × ").replace("^2", "²")
+
+
 def enumeration(items: Sequence[str]) -> str:
     """ "a", "a and b", "a, b and c"; "none" for an empty list."""
     if not items:

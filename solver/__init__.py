@@ -75,6 +75,7 @@ from solver.toml_file import (
     Whole,
     checked,
     json_schema,
+    naming_file,
     one_of,
     read_toml,
 )
@@ -216,6 +217,7 @@ __all__ = [
     "json_schema",
     "load_material",
     "named",
+    "naming_file",
     "npz_arrays",
     "observable_names",
     "observables_in",

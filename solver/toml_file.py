@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -45,6 +46,21 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise ParameterError(f"{path}: not a text file in UTF-8") from None
     except (tomllib.TOMLDecodeError, RecursionError) as error:  # nested deeper than the parser goes
         raise ParameterError(f"{path}: {error}") from None
+
+
+@contextmanager
+def naming_file(
+    path: Path, *caught: type[Exception], raised: type[Exception] = ParameterError, within: Path | None = None
+) -> Iterator[None]:
+    """Raise what is ``caught`` of the contents of ``path`` as ``raised``, with the file's name in front.
+
+    A message that begins with a name already, of the file or of one ``within`` a folder, stays as it is.
+    """
+    try:
+        yield
+    except caught as error:
+        text = str(error)
+        raise raised(text if text.startswith(str(within or path)) else f"{path}: {text}") from None
 
 
 def checked(kind: type[T], table: object, where: str = "") -> T:

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Literal
 
@@ -168,16 +168,14 @@ def find_optimum(
     share = np.nan_to_num((solution_high - solution_low) / 2)
     unidentified = tuple(name for name, part in zip(surface.names, share, strict=True) if part >= unidentified_share)
     interval_low, interval_high = surface.confidence_interval(point)
-    better = analyse_surface(surface).better_than_noise
-    predicted = float(surface.predict(point))
-    return Optimum(
+    found = Optimum(
         names=surface.names,
         target=target,
         target_standard_error=target_standard_error,
         reached=reached,
         point_coded=point,
         point=region.natural(point),
-        predicted=predicted,
+        predicted=float(surface.predict(point)),
         predicted_low=float(interval_low),
         predicted_high=float(interval_high),
         reachable_low=float(bounds.low[0]),
@@ -197,18 +195,10 @@ def find_optimum(
         solution_share=share,
         unidentified=unidentified,
         compatible_share=compatible_share(surface, target, target_standard_error),
-        better_than_noise=better,
-        statement=_statement(
-            surface.names,
-            target,
-            reached,
-            predicted,
-            region.natural(point),
-            unidentified,
-            (region.natural(solution_low), region.natural(solution_high)),
-            better,
-        ),
+        better_than_noise=analyse_surface(surface).better_than_noise,
+        statement="",
     )
+    return replace(found, statement=_statement(found))
 
 
 def find_compromise(models: Sequence[Surface], targets: Sequence[Target], reference: npt.ArrayLike) -> Compromise:
@@ -297,33 +287,25 @@ def bootstrap_coefficients(surface: Surface, refits: int, seed: int) -> tuple[Fl
     return coefficients, method  # type: ignore[return-value]
 
 
-def _statement(
-    names: tuple[str, ...],
-    target: float,
-    reached: bool,
-    predicted: float,
-    point: FloatArray,
-    unidentified: tuple[str, ...],
-    solution: tuple[FloatArray, FloatArray],
-    better_than_noise: bool,
-) -> str:
+def _statement(found: Optimum) -> str:
     """Return the result in one or two sentences."""
-    place = ", ".join(f"{name} = {value:.4g}" for name, value in zip(names, point, strict=True))
-    if reached and unidentified:
+    target, unidentified = found.target, found.unidentified
+    place = ", ".join(f"{name} = {value:.4g}" for name, value in zip(found.names, found.point, strict=True))
+    if found.reached and unidentified:
         ranges = ", ".join(
             f"{name} in {low:.4g} … {high:.4g}"
-            for name, low, high in zip(names, *solution, strict=True)
+            for name, low, high in zip(found.names, found.solution_low, found.solution_high, strict=True)
             if name in unidentified
         )
         text = f"The target {target:.4g} does not identify {', '.join(unidentified)}: the model gives it with {ranges}"
         text += " (not in every combination). " if len(unidentified) > 1 else ". "
         text += f"Chosen by rule, nearest to the reference among the settings that give the target: {place}."
-    elif reached:
+    elif found.reached:
         text = f"The model gives {target:.4g} at {place}, the solution nearest to the reference."
     else:
         text = f"The model does not reach {target:.4g} in the region; "
-        text += f"its nearest value is {predicted:.4g} at {place}."
-    if not better_than_noise:
+        text += f"its nearest value is {found.predicted:.4g} at {place}."
+    if not found.better_than_noise:
         text += " The surface is not better than noise, so this point is not a calibration."
     return text
 

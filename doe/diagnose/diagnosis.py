@@ -111,7 +111,7 @@ def run_diagnosis(
     model, everywhere = pours_in(measurement.fit), pours_in(measurement.conditions)
     training = TrainingPours(declared, measurement.fit, model, budget, say)
     compared = pursued(training, measurement.fit, budget, say)
-    verdict = verdict_of(compared, declared, training.levels, training.pours, follow_up is not None)
+    verdict = verdict_of(compared, declared, training.pours, follow_up is not None)
     say(f"verdict: {verdict.kind}")
     confirmed, verdict = concluded(verdict, compared, declared, measurement.conditions, everywhere, say)
     candidates = CandidateExperiments((), 0)

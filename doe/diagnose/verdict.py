@@ -20,7 +20,7 @@ import numpy.typing as npt
 from doe.declared.model import CalibratedParameter, Declared
 from doe.diagnose.compared_features import Compared
 from doe.diagnose.posterior import FITS, TEMPERATURE, Fit, Posterior
-from doe.diagnose.result import NO_EFFECT, UNEXPLAINED, EffectRow, Level, ParameterRow, Place, Residual
+from doe.diagnose.result import NO_EFFECT, UNEXPLAINED, EffectRow, ParameterRow, Place, Residual
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
@@ -126,9 +126,7 @@ def listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
 
 
-def verdict_of(
-    compared: Compared, declared: Declared, levels: Sequence[Level], pours: Sequence[int], followed_up: bool
-) -> Verdict:
+def verdict_of(compared: Compared, declared: Declared, pours: Sequence[int], followed_up: bool) -> Verdict:
     """The verdict with its tables. ``pours``: that taught each way; ``followed_up``: whether nothing can be asked."""
     found = compared.posterior
     kind, names, statement = answer(found, NOTHING_FROM if followed_up else NOTHING_AT_ONCE)
@@ -147,7 +145,7 @@ def verdict_of(
         effects=tuple(_effect_row(compared, white, label, pours) for label in rows),
         parameters=tuple(_parameter_row(p, j, before, after) for j, p in enumerate(declared.parameters)),
         residuals=_residuals(compared, before, after),
-        where=_places(compared, white),
+        where=_places(compared),
         final=final,
         similar=_similar(compared, white),
         left_out=compared.left_out,
@@ -249,7 +247,7 @@ def _residuals(compared: Compared, before: Fit, after: Fit) -> tuple[Residual, .
     )
 
 
-def _places(compared: Compared, white: _Recalibrated) -> tuple[Place, ...]:
+def _places(compared: Compared) -> tuple[Place, ...]:
     """Shares by condition: of the residual of the features as they are, whitened within the condition."""
     rows = _residuals(compared, compared.posterior.fits["base"], compared.posterior.fits["base"])
     totals = {condition: 0.0 for condition, _ in _conditions(compared)}

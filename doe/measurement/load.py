@@ -31,6 +31,7 @@ from solver import (
     files_named_in,
     load_material,
     named,
+    naming_file,
     own_path,
     parse_quantity,
     read_toml,
@@ -64,7 +65,8 @@ def load_measurement(folder: Path) -> Measurement:
     if not folder.is_dir():
         raise MeasurementError(f"{folder}: no such folder")
     path = folder / FILE
-    with _naming(path):
+    errors = ParameterError, StudyFileError, MeasurementError, AssetNotFoundError
+    with naming_file(path, *errors, raised=MeasurementError, within=path.parent):
         table = read_toml(path)
         outside = [f"{key}: {file} is outside the folder" for key, file in outside_files(folder, table)]
         return _read(folder, table, outside)
@@ -221,13 +223,3 @@ def _within(name: str | None) -> Iterator[None]:
         yield
     except (ParameterError, StudyFileError, MeasurementError, AssetNotFoundError) as error:
         raise MeasurementError(f"condition {name!r}: {error}" if name else f"condition: {error}") from None
-
-
-@contextmanager
-def _naming(path: Path) -> Iterator[None]:
-    """Put the name of the file in front of an error about its contents, unless the error names a file itself."""
-    try:
-        yield
-    except (ParameterError, StudyFileError, MeasurementError, AssetNotFoundError) as error:
-        text = str(error)
-        raise MeasurementError(text if text.startswith(str(path.parent)) else f"{path}: {text}") from None

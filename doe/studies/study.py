@@ -41,6 +41,7 @@ from solver import (
     checked,
     is_material,
     load_material,
+    naming_file,
     observable_names,
     one_of,
     parameters,
@@ -287,11 +288,8 @@ class StudyFile(TomlTable):
 def load_study(name: str) -> Study:
     """Study from a shipped name or a file; every mistake is one line that names file, key and what is allowed."""
     path = asset_path("studies", name)
-    try:
+    with naming_file(path, ParameterError, StudyFileError):
         return study_from(read_toml(path), path)
-    except (ParameterError, StudyFileError) as error:
-        text = str(error)
-        raise ParameterError(text if text.startswith(str(path)) else f"{path}: {text}") from None
 
 
 def with_profile(study: Study, name: str) -> tuple[Study, Profile]:

@@ -212,7 +212,7 @@ class Answers:
         fitted, held = self.model_pours(measurement.fit), self.model_pours(measurement.holdout)
         training = TrainingPours(declared, measurement.fit, fitted, self.budget, say)
         compared = pursued(training, measurement.fit, self.budget, say)
-        verdict = verdict_of(compared, declared, training.levels, training.pours, follow_up is not None)
+        verdict = verdict_of(compared, declared, training.pours, follow_up is not None)
         conclusion, verdict = concluded(verdict, compared, declared, measurement.holdout, held, say)
         found = compared.posterior
         suggestion = None
@@ -239,8 +239,6 @@ class Answers:
             amplitude=amplitude_text(truth),
             offer=offer,
             verdict=verdict.kind,
-            first="",
-            follow_up="",
             nothing=found.nothing,
             outside=found.outside,
             best=best,
@@ -255,7 +253,6 @@ class Answers:
             bias_before=bias_before,
             bias_after=bias_after,
             pours=fitted.run_now + held.run_now,
-            seconds=0.0,
         )
         return Judged(row, suggestion)
 
@@ -307,8 +304,17 @@ class Answers:
         """The row of a truth that cannot be, or whose pours keep breaking off."""
         verdict = OUT_OF_REACH + (truth.missing or "pours break off")
         case, title = truth.case, self.measurement.title
-        return SetRow(title, case.root, case.number, case.kind, label_of(truth), case.strength, amplitude_text(truth),
-                   offer, verdict, "", "", NAN, NAN, "", NAN, NAN, {}, {}, NAN, NAN, NAN, NAN, NAN, 0, 0.0)  # fmt: skip
+        return SetRow(
+            laboratory=title,
+            root=case.root,
+            number=case.number,
+            kind=case.kind,
+            label=label_of(truth),
+            strength=case.strength,
+            amplitude=amplitude_text(truth),
+            offer=offer,
+            verdict=verdict,
+        )
 
     def model_pours(self, conditions: Sequence[Condition], place: int | None = None) -> ModelPours:
         """Pours of the declared model, as a diagnosis makes them."""

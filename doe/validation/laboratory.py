@@ -21,7 +21,7 @@ import tomlkit
 from doe.errors import MeasurementError
 from doe.measurement import Measurement, load_measurement
 from doe.validation.scanner import Scanner, ScannerRanges, write_scan
-from solver import Names, ParameterError, Settings, TomlTable, all_names, asset_path, checked, one_of, read_toml
+from solver import Names, Settings, TomlTable, all_names, asset_path, checked, naming_file, one_of, read_toml
 
 Array = npt.NDArray[np.float64]
 
@@ -143,7 +143,7 @@ def read_laboratory(path: Path) -> Laboratory:
     """
     if not path.is_file():
         raise MeasurementError(f"{path}: no such file")
-    try:
+    with naming_file(path, MeasurementError, ValueError, raised=MeasurementError):
         table = read_toml(path)
         own = checked(LaboratoryTable, table.get("laboratory", {}), "laboratory")
         for name in own.readings:
@@ -155,9 +155,6 @@ def read_laboratory(path: Path) -> Laboratory:
                 )
         _check_ranges(own.scanner)
         reference = None if own.reference is None else asset_path("validation", own.reference, relative_to=path.parent)
-    except (MeasurementError, ParameterError, ValueError) as error:
-        text = str(error)
-        raise MeasurementError(text if text.startswith(str(path)) else f"{path}: {text}") from None
     return Laboratory(
         path, {key: value for key, value in table.items() if key != "laboratory"}, own.readings, own.scanner, reference
     )

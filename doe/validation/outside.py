@@ -56,8 +56,6 @@ POURED = ("sticky_funnel", "draught", "raised_funnel")
 CLUMPS = ("breaking_bodies", "stray_spheres")
 """Those that need bodies of member spheres."""
 
-Act = Callable[[Batch, Pour, float], None]
-
 
 def possible(scene: Scene, kinds: Sequence[str]) -> tuple[str, ...]:
     """Those of ``kinds`` that there can be in ``scene``."""

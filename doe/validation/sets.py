@@ -15,7 +15,7 @@ Stat. Assoc. 22:209: (p + z²/2n ± z √(p (1 − p)/n + z²/4n²))/(1 + z²/n)
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
@@ -48,7 +48,7 @@ TEMPERATURES = (0.4, 0.55, 0.7, 0.85, 1.0, 1.3)
 """By which the evidence of kept rows is weighed again."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SetRow(Record):
     """One data set, judged by data of one kind.
 
@@ -97,22 +97,22 @@ class SetRow(Record):
     amplitude: str
     offer: str
     verdict: str
-    first: str
-    follow_up: str
-    nothing: float
-    outside: float
-    best: str
-    best_p: float
-    truth_p: float
-    evidence: Mapping[str, float]
-    fits: Mapping[str, float]
-    held_out_p: float
-    before: float
-    after: float
-    bias_before: float
-    bias_after: float
-    pours: int
-    seconds: float
+    first: str = ""
+    follow_up: str = ""
+    nothing: float = math.nan
+    outside: float = math.nan
+    best: str = ""
+    best_p: float = math.nan
+    truth_p: float = math.nan
+    evidence: Mapping[str, float] = field(default_factory=dict)
+    fits: Mapping[str, float] = field(default_factory=dict)
+    held_out_p: float = math.nan
+    before: float = math.nan
+    after: float = math.nan
+    bias_before: float = math.nan
+    bias_after: float = math.nan
+    pours: int = 0
+    seconds: float = 0.0
 
     @property
     def answer(self) -> Answer:

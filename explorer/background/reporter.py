@@ -16,6 +16,7 @@ import json
 import logging
 import secrets
 import shlex
+import signal
 import sys
 import time
 from collections import deque
@@ -223,6 +224,14 @@ def _end_line(file: Path) -> None:
     if file.is_file() and not (told := file.read_bytes()).endswith(b"\n") and told:
         with file.open("a", encoding="utf-8") as stream:
             stream.write("\n")
+
+
+def end_as_by_ctrl_c() -> None:
+    """Let SIGTERM, by which the page cancels a command and CI ends one, end it as Ctrl-C does.
+
+    The end is told then, the store is closed, and finished pours are kept.
+    """
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
 def reporter_of(command: str, json: bool) -> Reporter:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from pathlib import Path
 
 import typer
@@ -50,7 +49,7 @@ def calibrate(
     """Calibrate a material: pilot, reach, screening, ascent, response surface, optimum, verification, report."""
     from doe.errors import StudyStopped
     from doe.studies.baseline import BaselineError, compare, moved
-    from explorer.background.reporter import reporter_of
+    from explorer.background.reporter import end_as_by_ctrl_c, reporter_of
     from explorer.errors import CommandError
     from explorer.files.output_file import write_whole
     from explorer.study import for_ci
@@ -62,8 +61,7 @@ def calibrate(
     check_scheduler(scheduler, threads)
     # Before any pour: a file that is no result is told at once.
     before = for_ci.read_baseline(baseline) if baseline is not None else None
-    # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished runs kept.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    end_as_by_ctrl_c()
     one_file = record is not None and record.suffix == ".rrd"
     folder, piles = (None, record) if one_file else (record, None)
     if scheduler and folder is not None:
@@ -74,17 +72,17 @@ def calibrate(
         study,
         profile,
         out,
-        resume,
-        store,
-        folder,
-        threads,
-        tries,
-        author,
-        notes,
-        target,
-        beyond_reach,
-        piles,
-        scheduler,
+        resume=resume,
+        store=store,
+        record=folder,
+        threads=threads,
+        tries=tries,
+        author=author,
+        notes=notes,
+        target=target,
+        beyond_reach=beyond_reach,
+        piles=piles,
+        scheduler=scheduler,
     )
     try:
         with reporter_of("calibrate", json) as reporter:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from pathlib import Path
 
 import typer
@@ -37,15 +36,14 @@ def diagnose(
     ),
 ) -> None:
     """Calibrate the declared model, test what is left, name the missing effect, confirm it by fresh pours."""
-    from explorer.background.reporter import reporter_of
+    from explorer.background.reporter import end_as_by_ctrl_c, reporter_of
     from explorer.diagnosis.run import DiagnoseOrder, run_diagnose
     from solver import check_scheduler
     from solver.assets import measurement_folder
 
     check_scheduler(scheduler, threads)
 
-    # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished pours kept.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    end_as_by_ctrl_c()
     names = tuple(name.strip() for name in effects.split(",") if name.strip())
     order = DiagnoseOrder(
         folder=measurement_folder(folder),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from pathlib import Path
 
 import typer
@@ -25,10 +24,11 @@ def limit(
 ) -> None:
     """Pour every effect many times and print the Bayes limit: what scalars, profiles and scans can tell at best."""
     from doe.validation.laboratory import TREFOILS
+    from explorer.background.reporter import end_as_by_ctrl_c
     from explorer.diagnosis.limit import LimitOrder, limit_text, run_limit
     from solver.assets import measurement_folder
 
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    end_as_by_ctrl_c()
     path = Path(source) if source else TREFOILS
     order = LimitOrder(path if path.is_file() else measurement_folder(source), rounds, out, reference, store, threads)
     typer.echo(limit_text(*run_limit(order, typer.echo)))

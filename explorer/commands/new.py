@@ -122,7 +122,17 @@ def new(
         asked = NewCondition(condition, role, study, material, tuple(set_), tuple(uncertainty))
         pixel = None if scale is None else 1e-3 * scale
         photographs = tuple(asset_path("photographs", one) for one in photo)
-        brought = Brought(photographs, pixel, angles, tuple(balance), tuple(starts), lag, tuple(scan), scan_unit, drum)
+        brought = Brought(
+            photographs=photographs,
+            pixel=pixel,
+            angles=angles,
+            balances=tuple(balance),
+            starts=tuple(starts),
+            lag=lag,
+            scans=tuple(scan),
+            scan_unit=scan_unit,
+            drum=drum,
+        )
         found = write_condition(out / name, asked, brought)
         if json:
             plain = {"written": list(map(str, found.files)), "told": list(found.told), "proposal": found.proposal}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from pathlib import Path
 
 import typer
@@ -27,7 +26,7 @@ def repeat(
 
     Pours that a calibration has made of exactly this scene count as well.
     """
-    from explorer.background.reporter import reporter_of
+    from explorer.background.reporter import end_as_by_ctrl_c, reporter_of
     from explorer.population.run import PoursOrder, pour_more
     from explorer.scene.file import load_scene, with_settings
     from explorer.study.duration import large_pour_text
@@ -36,8 +35,7 @@ def repeat(
 
     check_scheduler(scheduler, threads)
 
-    # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished pours kept.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    end_as_by_ctrl_c()
     scene = with_settings(load_scene(source, material), set_)
     if large := large_pour_text(scene):
         typer.echo(large, err=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import os
-import signal
 from collections import deque
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -72,7 +71,7 @@ def simulate(
 
     from doe.declared.pours import Ended
     from explorer.background.progress import PourProgress, SimulatedTime
-    from explorer.background.reporter import EVERY, Reporter
+    from explorer.background.reporter import EVERY, Reporter, end_as_by_ctrl_c
     from explorer.errors import CommandError
     from explorer.files.checkpoint_writer import CheckpointWriter
     from explorer.files.run_folder import appearing, json_text, write_run
@@ -86,8 +85,7 @@ def simulate(
     from solver.rigs import BENCH_RIGS
     from solver.single_body import run_bench_test
 
-    # A command that CI cancels tells its end, like one that is stopped by Ctrl-C.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    end_as_by_ctrl_c()
     if json and events:
         raise CommandError("--json prints the result, --events what happens meanwhile; name one of them")
     check_scheduler(scheduler, threads)

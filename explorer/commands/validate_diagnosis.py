@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from pathlib import Path
 
 import typer
@@ -38,7 +37,7 @@ def validate_diagnosis(
     from doe.validation.campaign import SETS, CampaignOrder, run_campaign
     from doe.validation.laboratory import TREFOILS, read_laboratory
     from explorer.background.progress import SetProgress
-    from explorer.background.reporter import reporter_of
+    from explorer.background.reporter import end_as_by_ctrl_c, reporter_of
     from explorer.errors import CommandError
     from explorer.tables.validation import campaign_text
     from solver import check_scheduler
@@ -65,8 +64,7 @@ def validate_diagnosis(
     )
     # A wrong file is told before anything is made.
     read_laboratory(order.laboratory)
-    # A command that CI cancels tells its end, like one that is stopped by Ctrl-C.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    end_as_by_ctrl_c()
     with reporter_of("validate-diagnosis", json) as reporter:
         out.mkdir(parents=True, exist_ok=True)
         reporter.begin(out, resumed=(out / SETS).exists())

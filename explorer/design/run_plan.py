@@ -17,7 +17,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -60,6 +60,7 @@ class DesignOrder:
     """What a user asked for; None: as the factors file says, else the usual value."""
 
     design: str
+    _: KW_ONLY
     runs: int | None = None
     replicates: int | None = None
     centre: int | None = None

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -108,8 +107,3 @@ def write_yade_bed(folder: Path, bed: Bed) -> None:
 
 BED_WRITERS: dict[str, Callable[[Path, Bed], None]] = {"liggghts": write_liggghts_bed, "yade": write_yade_bed}
 """Engine → what writes its bed into an existing folder."""
-
-
-def sphere_mass(bed: Bed) -> Array:
-    """4/3 π r³ ρ [kg], shape (n,)."""
-    return 4.0 / 3.0 * math.pi * bed.radius**3 * bed.density

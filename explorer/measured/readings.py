@@ -63,7 +63,7 @@ class Row:
     x: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Brought:
     """Files of one condition, in the order of its pours."""
 

@@ -79,7 +79,9 @@ def run_study(
         What the runs of a stage gave cannot be analysed.
     """
     kept = None if store is None else Path(store)
-    order = study_run.StudyOrder(str(study), profile, Path(out), resume, kept, threads=workers, tries=tries)
+    order = study_run.StudyOrder(
+        str(study), profile, Path(out), resume=resume, store=kept, threads=workers, tries=tries
+    )
     with Reporter("calibrate", say) as reporter:
         return study_run.run_study(order, reporter)
 

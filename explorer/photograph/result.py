@@ -46,7 +46,7 @@ class MeasuredPhotographs:
         return tuple(reading for reading in self.readings if isinstance(reading, Refusal))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ReadPile(Record):
     """A pile on a picture; lengths in ``unit`` ("m" or "px"), angles [°], each with half its 95 % interval."""
 
@@ -124,19 +124,19 @@ def _read(pile: PhotographedPile, board: Board | None) -> ReadPile:
     )
     ends = pile.base.at(np.array([0.0, pile.size[0] - 1.0]))
     return ReadPile(
-        pile.name,
-        pile.unit,
-        left,
-        right,
-        mean,
-        pile.height,
-        pile.half_width,
-        tuple(pile.outline.u[::step].tolist()),
-        tuple(pile.outline.top[::step].tolist()),
-        pile.angles.left.thirds_deg,
-        pile.angles.right.thirds_deg,
-        pile.lens,
-        "" if board is None else board.name,
+        name=pile.name,
+        unit=pile.unit,
+        left=left,
+        right=right,
+        mean=mean,
+        height=pile.height,
+        half_width=pile.half_width,
+        u=tuple(pile.outline.u[::step].tolist()),
+        z=tuple(pile.outline.top[::step].tolist()),
+        left_thirds=pile.angles.left.thirds_deg,
+        right_thirds=pile.angles.right.thirds_deg,
+        lens=pile.lens,
+        checkerboard="" if board is None else board.name,
         size=pile.size,
         pixel=pile.pixel,
         base=(float(ends[0]), float(ends[1])),

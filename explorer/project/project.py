@@ -22,7 +22,7 @@ from explorer.scene.presets import data_folder
 from explorer.scene.source import SceneSource, material_source, study_source
 from explorer.scene.starter_files import STUDY_ENDING, study_scene, study_text, write_study
 from solver import ParameterError
-from solver.toml_file import TomlTable, checked, read_toml
+from solver.toml_file import TomlTable, checked, naming_file, read_toml
 
 FILE = "project.toml"
 FORMAT = 1
@@ -114,16 +114,13 @@ def new_project(folder: Path, material: str | None = None) -> list[Path]:
 def load_project(folder: Path) -> Project:
     """The project in ``folder``. Raises a ValueError with one line that names file and key."""
     file = folder / FILE
-    try:
+    with naming_file(file, ParameterError):
         table = checked(ProjectFile, read_toml(file))
         if table.format != FORMAT:
             raise ParameterError(f"format: {table.format!r} is not {FORMAT}")
         for key, name in (("study", table.study), ("measured", table.measured)):
             if name and not (folder / name).exists():
                 raise ParameterError(f"{key}: {folder / name} does not exist")
-    except ParameterError as error:
-        text = str(error)
-        raise ParameterError(text if text.startswith(str(file)) else f"{file}: {text}") from None
     study = folder / table.study
     return Project(
         title=table.title or folder.absolute().name,

@@ -9,8 +9,7 @@ finished calibration means its study's set-up with the factors at the optimum.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from doe.studies.study import load_study, with_profile
 from doe.studies.study_result import StudyResult
 from explorer.errors import CommandError
 from explorer.report.identified import settings
-from solver import ParameterError, Scene, is_material, load_material, read_toml, with_set_up, with_values
+from solver import ParameterError, Scene, is_material, load_material, naming_file, read_toml, with_set_up, with_values
 from solver.assets import AssetKind, AssetNotFoundError, asset_path, own_path, shipped_assets
 from solver.rigs import BENCH_RIGS, RIGS
 from solver.scenes.material_file import SET_UP
@@ -36,6 +35,8 @@ SET_UP_KEYS = ("format", "title", "material", *SET_UP)
 SOURCES = (*RIGS, *BENCH_RIGS)
 """Rigs that can be named on the command line."""
 RESULT = "result.json"
+WRONG = (ParameterError, AssetNotFoundError, ShapeError)
+"""What the contents of a file can raise."""
 
 
 def load_scene(source: str, material: str | None = None) -> Scene:
@@ -63,7 +64,7 @@ def load_scene(source: str, material: str | None = None) -> Scene:
         return material_scene(str(path))
     if "target" in table or "factor" in table:
         return study_scene(path)
-    with _naming(path):
+    with naming_file(path, *WRONG):
         return _set_up_scene(table, path)
 
 
@@ -92,7 +93,7 @@ def _file_of(source: str) -> Path:
 def material_scene(name: str, relative_to: Path | None = None) -> Scene:
     """The scene of a material by its path or shipped name; its rig is the funnel unless the file says otherwise."""
     path = asset_path("materials", name, relative_to=relative_to)
-    with _naming(path):
+    with naming_file(path, *WRONG):
         return load_material(str(path))
 
 
@@ -110,23 +111,13 @@ def _set_up_scene(table: dict[str, Any], path: Path) -> Scene:
 
 def study_scene(path: Path) -> Scene:
     """The scene of a study file: its material and set-up with every factor at its reference."""
-    with _naming(path):
+    with naming_file(path, *WRONG):
         return load_study(str(path)).scene
 
 
 def study_path(study: str) -> Path:
     """The file of a study, by its path or shipped name."""
     return asset_path("studies", study)
-
-
-@contextmanager
-def _naming(path: Path) -> Iterator[None]:
-    """Put the name of the file in front of an error about its contents."""
-    try:
-        yield
-    except (ParameterError, AssetNotFoundError, ShapeError) as error:
-        text = str(error)
-        raise ParameterError(text if text.startswith(str(path)) else f"{path}: {text}") from None
 
 
 def with_settings(scene: Scene, settings: Sequence[str]) -> Scene:

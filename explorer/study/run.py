@@ -12,7 +12,7 @@ import json
 import re
 from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -70,6 +70,7 @@ class StudyOrder:
     study: str
     profile: str
     out: Path
+    _: KW_ONLY
     resume: bool = False
     store: Path | None = None
     record: Path | None = None

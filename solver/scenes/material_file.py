@@ -50,6 +50,7 @@ from solver.toml_file import (
     TomlTable,
     Vector,
     checked,
+    naming_file,
     one_of,
     parameters_schema,
     read_toml,
@@ -179,11 +180,8 @@ class MaterialFile(TomlTable):
 def load_material(name: str, relative_to: Path | None = None) -> Scene:
     """Scene from a shipped material's name or a material file's path, in the funnel unless the file says else."""
     path = asset_path("materials", name, relative_to=relative_to)
-    try:
+    with naming_file(path, ParameterError, ShapeError):
         return scene_from(read_toml(path), path)
-    except (ParameterError, ShapeError) as error:
-        text = str(error)
-        raise ParameterError(text if text.startswith(str(path)) else f"{path}: {text}") from None
 
 
 FILE_KEYS = ("file", "mesh")

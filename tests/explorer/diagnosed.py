@@ -229,7 +229,7 @@ def diagnosed(
     lessons = lessons_of(world, declared, levels, draw)
     compared = weighed(lessons, ways, offers)
     taught = [int((lessons.way == w).sum()) for w in range(len(ways))]
-    verdict = verdict_of(compared, declared, levels, taught, followed_up=False)
+    verdict = verdict_of(compared, declared, taught, followed_up=False)
     fresh = FormulaPours(world, declared, ways, conditions, draw)
     found, verdict = concluded(verdict, compared, declared, conditions, fresh, lambda line: None)
     return measurement, Diagnosis(

@@ -23,7 +23,7 @@ def elementary(result: DesignResult) -> Section | None:
             "is the mean of their sizes: how much a factor acts. σ is their scatter: none where it acts linearly and "
             "alone, much where it bends, acts together with others, or where single runs are noisy."
         ),
-        Facts(tuple(elementary_facts(result, found))),
+        Facts(tuple(elementary_facts(found))),
         Figure("morris", morris_chart(result, found), f"{n}. Bars: 95 % of μ* (t)."),
         elementary_table(result, found),
     ]
@@ -41,7 +41,7 @@ def elementary_words(found: ElementaryEffects) -> str:
     return f"by μ* {largest}; mean effect told from zero: {enumeration(told(found))} (p < 0.05 after Holm's correction)"
 
 
-def elementary_facts(result: DesignResult, found: ElementaryEffects) -> list[tuple[str, str]]:
+def elementary_facts(found: ElementaryEffects) -> list[tuple[str, str]]:
     """What acts, and what bends or acts with others."""
     bent = [one.factor for one in found.effects if one.sigma > one.mu_star > 0]
     return [

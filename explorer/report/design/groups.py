@@ -9,7 +9,7 @@ from explorer.design.result import DesignResult
 from explorer.report.content import Block, Facts, Figure, Folded, Section, Spec, Table, Text
 from explorer.report.design.names import means_table
 from explorer.report.figures.style import FACTOR, axis, chart, horizontal_line, label, points
-from explorer.units import enumeration, number, observable_title, observed, p_value, percent, signed
+from explorer.units import enumeration, number, observable_title, observed, p_value, percent, signed, term_text
 
 ACTS = 0.05
 
@@ -40,7 +40,7 @@ def groups(result: DesignResult) -> Section | None:
 
 def group_facts(result: DesignResult, found: RandomFit) -> list[tuple[str, str]]:
     """What acts, and what share of the scatter lies between the groups."""
-    acting = enumeration([one.source.replace("*", " × ").replace("^2", "²") for one in found.tests if one.p < ACTS])
+    acting = enumeration([term_text(one.source) for one in found.tests if one.p < ACTS])
     between, within = found.components
     response = result.response.path
     return [
@@ -69,7 +69,7 @@ def tests_table(found: RandomFit) -> Table:
     """Every term against its own error."""
     rows = tuple(
         (
-            one.source.replace("*", " × ").replace("^2", "²"),
+            term_text(one.source),
             str(one.df),
             number(one.df_error, 4),
             number(one.f),
@@ -84,7 +84,7 @@ def estimates_table(found: RandomFit) -> Table:
     """Coefficients of numbers, and of factors of two names (−1 and +1)."""
     rows = tuple(
         (
-            one.term.replace("*", " × ").replace("^2", "²"),
+            term_text(one.term),
             number(one.value, 5),
             f"± {number(one.standard_error)}",
             number(one.df, 4),

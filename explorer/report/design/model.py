@@ -19,7 +19,7 @@ from explorer.report.figures.effects import half_normal, main_effects, pareto
 from explorer.report.figures.model import FittedTarget, profiler
 from explorer.report.figures.surface import contours, fit, height_over, residual_quantiles
 from explorer.report.sections.surface import anova_table, equation, variance_table
-from explorer.units import MISSING, enumeration, fixed, number, observed, p_value, parameter_value, signed
+from explorer.units import MISSING, enumeration, fixed, number, observed, p_value, parameter_value, signed, term_text
 
 MOST_ALIASES = 4
 """Effects that share a column and are listed by name."""
@@ -42,7 +42,7 @@ def mixture(result: DesignResult) -> Section | None:
 def mixture_table(result: DesignResult, found: MixtureFit) -> Table:
     """Coefficients of the polynomial with their errors."""
     rows = tuple(
-        (term.replace("*", " × "), observed(result.response.path, value), number(error), p_value(p))
+        (term_text(term), observed(result.response.path, value), number(error), p_value(p))
         for term, value, error, p in zip(
             found.terms, found.coefficients.tolist(), found.standard_errors.tolist(), found.p.tolist(), strict=True
         )
@@ -111,7 +111,7 @@ def effect_table(part: DrawnEffects) -> Table:
         by_replicates, by_columns = effect.by_replicates, effect.by_dummies
         rows.append(
             (
-                name.replace("*", " × ") + (" (error)" if effect.is_dummy else ""),
+                term_text(name) + (" (error)" if effect.is_dummy else ""),
                 also_holds(part.aliases.get(name, ())),
                 signed(effect.effect, 4),
                 number(effect.sum_of_squares, 5),
@@ -270,7 +270,7 @@ def coefficient_table(found: FittedModel) -> Table:
     """Coded and actual coefficients of the model's terms."""
     fitted = found.surface
     rows = tuple(
-        (term.replace("*", " × ").replace("^2", "²"), number(coded, 5), f"± {number(error, 3)}", number(actual, 6))
+        (term_text(term), number(coded, 5), f"± {number(error, 3)}", number(actual, 6))
         for term, is_in, coded, error, actual in zip(
             fitted.terms,
             fitted.included,

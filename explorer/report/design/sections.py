@@ -38,6 +38,7 @@ from explorer.units import (
     parameter_value,
     percent,
     signed,
+    term_text,
 )
 
 WHOLE = ("block", "model", "residual", "lack_of_fit", "pure_error", "total")
@@ -263,10 +264,10 @@ def _acting_names(result: DesignResult) -> list[str]:
     if found.elementary is not None:
         return told(found.elementary)
     if found.random is not None:
-        return [one.source.replace("*", " × ").replace("^2", "²") for one in found.random.tests if one.p < ACTS]
+        return [term_text(one.source) for one in found.random.tests if one.p < ACTS]
     anova = found.model.anova if found.model is not None else found.named
     rows = [] if anova is None else [row for row in anova.rows if row.source not in WHOLE]
-    return [row.source.replace("*", " × ").replace("^2", "²") for row in rows if row.p < 0.05]
+    return [term_text(row.source) for row in rows if row.p < 0.05]
 
 
 def in_short(result: DesignResult) -> Section:
@@ -277,7 +278,7 @@ def in_short(result: DesignResult) -> Section:
         facts.append(("Factors that act", acting(found.effects.screening)))
         if found.effects.few_terms:
             best = found.effects.few_terms[0]
-            terms = enumeration([term.replace("*", " × ") for term in best.terms])
+            terms = enumeration([term_text(term) for term in best.terms])
             facts.append(
                 (
                     "Few terms that explain the runs",
@@ -316,7 +317,7 @@ def in_short(result: DesignResult) -> Section:
     if found.surrogate_target is not None:
         facts += target_facts(result, found.surrogate_target)
     if found.elementary is not None:
-        facts += elementary_facts(result, found.elementary)
+        facts += elementary_facts(found.elementary)
     if found.random is not None:
         facts += group_facts(result, found.random)
     if found.named is not None:
@@ -349,7 +350,7 @@ def acting(analysis: Screening) -> str:
 def terms_that_act(rows: Sequence[AnovaRow]) -> str:
     """Terms of the model with p < 0.05, each alone."""
     terms = [row for row in rows if row.source not in WHOLE]
-    acting = [row.source.replace("*", " × ").replace("^2", "²") for row in terms if row.p < 0.05]
+    acting = [term_text(row.source) for row in terms if row.p < 0.05]
     if all(math.isnan(row.p) for row in terms):
         return "cannot be told without scatter"
     return f"{enumeration(acting)} (p < 0.05 each alone, of {len(terms)} terms)"

@@ -33,6 +33,7 @@ from explorer.units import (
     parameter_value,
     percent,
     signed,
+    term_text,
     unit_of_observable,
     unit_of_parameter,
 )
@@ -153,7 +154,7 @@ def variance_table(sources: Sequence[AnovaRow], caption: str = "One order after 
     """Sources of variation with their tests."""
     rows = tuple(
         (
-            row.source.replace("_", " ").replace("*", " × ").replace("^2", "²"),
+            term_text(row.source.replace("_", " ")),
             number(row.sum_of_squares, 4),
             str(row.df),
             number(row.mean_square, 4),

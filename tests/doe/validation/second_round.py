@@ -64,7 +64,7 @@ class Asked:
         declared, budget = declare(measurement, tuple(EFFECTS)), self._answers.budget
         training = TrainingPours(declared, measurement.fit, pours_in(measurement.fit), budget, lambda line: None)
         compared = pursued(training, measurement.fit, budget, lambda line: None)
-        verdict = verdict_of(compared, declared, training.levels, training.pours, is_last and self._answers.follow_up)
+        verdict = verdict_of(compared, declared, training.pours, is_last and self._answers.follow_up)
         found = compared.posterior
         if is_last:
             return verdict, found, None

@@ -29,9 +29,26 @@ NAN = math.nan
 
 def row(number, kind, label, verdict, strength=NAN, after=NAN, offer="scan"):
     return SetRow(
-        "blind", 5, number, kind, label, strength, "", offer, verdict, "", "", 0.1, 0.1, "a", 0.8, NAN,
-        {"base": 0.0}, {"base": 0.5}, NAN, 2.0 * after, after, NAN, NAN, 12, 1.5,
-    )  # fmt: skip
+        laboratory="blind",
+        root=5,
+        number=number,
+        kind=kind,
+        label=label,
+        strength=strength,
+        amplitude="",
+        offer=offer,
+        verdict=verdict,
+        nothing=0.1,
+        outside=0.1,
+        best="a",
+        best_p=0.8,
+        evidence={"base": 0.0},
+        fits={"base": 0.5},
+        before=2.0 * after,
+        after=after,
+        pours=12,
+        seconds=1.5,
+    )
 
 
 @pytest.mark.parametrize(("hits", "sets"), [(0, 150), (3, 150), (7, 9), (9, 9)])
