@@ -1,10 +1,7 @@
-"""A command of the command line in a process of its own, and the orders that wait for it.
+"""A command of the command line in a process of its own.
 
 It has lower priority, so that the live pour stays smooth. The command writes ``progress.jsonl`` into its output folder,
 one `explorer.background.events.ProgressEvent` per line, which is all that is read here.
-
-The next order begins when the one before has come to its end: a report or a failure. A command that was cancelled
-leaves the line waiting for the next start, because who cancels wants quiet.
 """
 
 from __future__ import annotations
@@ -16,18 +13,16 @@ import signal
 import subprocess
 import sys
 import time
-from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import IO, Any, Generic, Literal, TypeVar
+from typing import IO, Any, Literal
 
 from explorer.background.events import PROGRESS, ProgressEvent, StageProgress, TriedRun, with_event, with_run
 from explorer.errors import CommandError
 from explorer.priority import BACKGROUND, lowered, session_gives_way
 
 CommandState = Literal["idle", "running", "paused", "cancelled", "finished", "failed"]
-Order = TypeVar("Order")
 
 CANCEL_WAIT = 5.0
 """Seconds that a cancelled command has to write what it has, before it is ended for good."""
@@ -35,7 +30,6 @@ LOCK_WAIT = 1.0
 """Seconds that the folder of a command of our own, which has ended, may stay locked by its workers."""
 PROGRAM = (sys.executable, "-m", "explorer")
 """How the command line is called."""
-MOST_WAITING = 5
 
 
 @dataclass(frozen=True)
@@ -260,54 +254,3 @@ def _locked(file: IO[bytes], patience: float) -> bool:
 def _whole_lines(stream: IO[bytes]) -> list[bytes]:
     """Lines that end in a newline; the writer may be in the middle of the last one."""
     return [line for line in stream if line.endswith(b"\n")]
-
-
-class WaitingLine(Generic[Order]):
-    """Orders for ``process``, which ``begin`` starts; ``what``: the word for several of them, such as "studies"."""
-
-    def __init__(self, process: CommandProcess, begin: Callable[[Order], None], what: str) -> None:
-        self._process, self._begin, self._what = process, begin, what
-        self._waiting: deque[Order] = deque()
-        self._follow_up = False
-
-    @property
-    def waiting(self) -> tuple[Order, ...]:
-        """The orders that wait, next one first."""
-        return tuple(self._waiting)
-
-    def add(self, order: Order) -> None:
-        """Begin ``order`` after those before it, at once if nothing runs. Raises BackgroundError if it is full."""
-        if len(self._waiting) >= MOST_WAITING:
-            raise BackgroundError(f"{MOST_WAITING} {self._what} wait already; more are not kept")
-        self._waiting.append(order)
-        if not self.status().alive:
-            self._begin_next()
-
-    def clear(self) -> None:
-        """Forget the orders that wait."""
-        self._waiting.clear()
-
-    def status(self) -> CommandStatus:
-        """Status of the process; begins the next order where a command has ended since the last look."""
-        status = self._process.status()
-        if status.alive:
-            self._follow_up = True
-        elif self._follow_up:
-            self._follow_up = False
-            if self._waiting and status.state in ("finished", "failed"):
-                try:
-                    self._begin_next()
-                except (ValueError, OSError) as error:
-                    # Nobody pressed a button that could tell: the status does, and the order still waits.
-                    return replace(status, state="failed", message=f"the next one cannot start: {error}")
-                return self._process.status()
-        return status
-
-    def _begin_next(self) -> None:
-        """Begin the first order; it waits on where that fails."""
-        self._begin(self._waiting[0])
-        self._waiting.popleft()
-
-    def begun(self) -> None:
-        """A command was started or resumed: its end lets the next order begin, even if nobody looks in between."""
-        self._follow_up = True

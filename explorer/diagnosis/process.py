@@ -1,6 +1,6 @@
 """Diagnoses in the background: the command line's ``diagnose``, run by `explorer.background.command_process`.
 
-One runs at a time; others wait (`explorer.background.command_process`).
+One runs at a time; others wait (`explorer.background.orders`).
 """
 
 from __future__ import annotations
@@ -12,15 +12,9 @@ from typing import Protocol
 
 from doe.diagnose.budget import scaled_budget
 from doe.measurement.load import load_measurement
-from explorer.background.command_process import (
-    PROGRAM,
-    BackgroundError,
-    CommandProcess,
-    CommandStatus,
-    PourPlace,
-    WaitingLine,
-)
-from explorer.background.output_folder import finished, new_folder, newest_unfinished
+from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess, PourPlace
+from explorer.background.orders import BackgroundOrders, OrderedCommands
+from explorer.background.output_folder import new_folder, newest_unfinished
 from explorer.diagnosis.result import DiagnosisResult
 from solver import EFFECTS
 from solver.assets import measurement_folder
@@ -43,7 +37,7 @@ class Question:
     given: str = ""
 
 
-class DiagnosisProcess(Protocol):
+class DiagnosisProcess(BackgroundOrders, Protocol):
     """What the page needs of diagnoses that run somewhere."""
 
     @property
@@ -56,39 +50,14 @@ class DiagnosisProcess(Protocol):
     def queue(self, question: Question) -> None:
         """Start it after those before it; at once if none runs and none waits."""
 
-    def clear_queue(self) -> None:
-        """Forget the diagnoses that wait."""
-
-    def waiting(self) -> tuple[str, ...]:
-        """The diagnoses that wait, next one first, in words."""
-
-    def cancel(self) -> None:
-        """Stop the diagnosis that runs; finished pours are kept."""
-
-    def pause(self) -> None:
-        """Let the diagnosis that runs stand still."""
-
-    def go_on(self) -> None:
-        """Let it go on."""
-
     def resume(self, question: Question) -> None:
         """Go on with the newest one of its data that was stopped. Raises a ValueError where there is none."""
 
     def resumable(self, question: Question) -> bool:
         """Whether :meth:`resume` has something to go on with."""
 
-    def status(self) -> CommandStatus:
-        """State, progress and what the parts have found."""
 
-    @property
-    def out(self) -> Path | None:
-        """Output folder of the diagnosis started last, None before the first."""
-
-    def finished(self) -> tuple[Path, ...]:
-        """Output folders of finished diagnoses, newest first."""
-
-
-class DiagnoseProcess:
+class DiagnoseProcess(OrderedCommands[Question]):
     """``explorer diagnose`` as a child process.
 
     Args:
@@ -105,12 +74,8 @@ class DiagnoseProcess:
         program: Sequence[str] = PROGRAM,
         place: PourPlace | None = None,
     ) -> None:
-        self._folder, self.store = folder, store
-        self._place = place or PourPlace()
-        self._process = CommandProcess("diagnosis", {0: "report"}, program)
-        self._line: WaitingLine[Question] = WaitingLine(self._process, self._begin, "diagnoses")
-        self.status, self.clear_queue = self._line.status, self._line.clear
-        self.cancel, self.pause, self.go_on = self._process.cancel, self._process.pause, self._process.go_on
+        super().__init__(CommandProcess("diagnosis", {0: "report"}, program), folder, RESULT, "diagnoses")
+        self.store, self._place = store, place or PourPlace()
 
     def start(self, question: Question) -> None:
         """Start a new diagnosis."""
@@ -120,11 +85,7 @@ class DiagnoseProcess:
 
     def queue(self, question: Question) -> None:
         """Start it when those before it have ended."""
-        self._line.add(_checked(question))
-
-    def waiting(self) -> tuple[str, ...]:
-        """Name of the data of every diagnosis that waits, and what was asked otherwise than by itself."""
-        return tuple(_in_words(question) for question in self._line.waiting)
+        self._add(_checked(question))
 
     def resume(self, question: Question) -> None:
         """Go on with the newest diagnosis of these data that was stopped, be it one of an earlier session of the page.
@@ -136,8 +97,7 @@ class DiagnoseProcess:
         found = self._unfinished(checked)
         if found is None:
             raise BackgroundError(f"no diagnosis of {Path(checked.data).name} has been stopped before its end")
-        self._process.resume(found[0], self._arguments(checked, found[0]))
-        self._line.begun()
+        self._go_on_in(found[0], self._arguments(checked, found[0]))
 
     def resumable(self, question: Question) -> bool:
         """Whether a diagnosis of these data was stopped before its end."""
@@ -146,25 +106,17 @@ class DiagnoseProcess:
     def _unfinished(self, question: Question) -> tuple[Path, str] | None:
         return newest_unfinished(self._folder, (Path(question.data).name,), RESULT)
 
-    def close(self) -> None:
-        """Cancel what runs and wait for its end."""
-        self.clear_queue()
-        self._process.close()
-
-    @property
-    def out(self) -> Path | None:
-        """Output folder of the diagnosis started last."""
-        return self._process.out
-
-    def finished(self) -> tuple[Path, ...]:
-        """Output folders of finished diagnoses, of any data, newest first."""
-        return finished(self._folder, RESULT)
-
     def _begin(self, question: Question) -> None:
         # One that goes on from another is not resumed by its data's name; asked again, it finds its pours in the store.
         out = new_folder(self._folder, Path(question.data).name + (FURTHER if question.given else ""))
-        self._process.start(out, self._arguments(question, out))
-        self._line.begun()
+        self._start(out, self._arguments(question, out))
+
+    def _in_words(self, question: Question) -> str:
+        """Name of its data, and what is asked otherwise than by itself."""
+        few = f", {len(question.effects)} effects" if question.effects else ""
+        pours = "" if question.budget is None else f", about {question.budget} pours"
+        given = f", going on from {Path(question.given).name}" if question.given else ""
+        return f"{Path(question.data).name}{few}{pours}{given}"
 
     def _arguments(self, question: Question, out: Path) -> list[str]:
         """The command line that is run, as a person would type it."""
@@ -188,10 +140,3 @@ def _checked(question: Question) -> Question:
         # Refused here, before a process is started for it.
         scaled_budget(question.budget, load_measurement(folder), question.effects or tuple(EFFECTS))
     return replace(question, data=str(folder))
-
-
-def _in_words(question: Question) -> str:
-    few = f", {len(question.effects)} effects" if question.effects else ""
-    pours = "" if question.budget is None else f", about {question.budget} pours"
-    given = f", going on from {Path(question.given).name}" if question.given else ""
-    return f"{Path(question.data).name}{few}{pours}{given}"

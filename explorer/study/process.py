@@ -1,7 +1,7 @@
 """Calibrations in the background: the command line's ``calibrate --headless``, run by
 `explorer.background.command_process`.
 
-One runs at a time; others wait (`explorer.background.command_process`).
+One runs at a time; others wait (`explorer.background.orders`).
 """
 
 from __future__ import annotations
@@ -12,16 +12,10 @@ from pathlib import Path
 from typing import Protocol
 
 from doe.studies.study import TRIES, Study, load_study, with_profile
-from explorer.background.command_process import (
-    PROGRAM,
-    BackgroundError,
-    CommandProcess,
-    CommandStatus,
-    PourPlace,
-    WaitingLine,
-)
+from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess, PourPlace
 from explorer.background.events import given_up
-from explorer.background.output_folder import finished, new_folder, newest_unfinished
+from explorer.background.orders import BackgroundOrders, OrderedCommands
+from explorer.background.output_folder import new_folder, newest_unfinished
 from explorer.files.output_file import write_whole
 from explorer.photograph.target import FOLDER, PhotographedTarget, load_target
 from explorer.study.edit import StudyEdits, edited_study
@@ -34,16 +28,12 @@ CHANGED = "_changed.toml"
 """End of the name of a study's own file in its output folder."""
 
 
-class StudyProcess(Protocol):
+class StudyProcess(BackgroundOrders, Protocol):
     """What the page needs of studies that run somewhere."""
 
     @property
     def study_file(self) -> Path:
         """The study as it is without changes."""
-
-    @property
-    def out(self) -> Path | None:
-        """Output folder of the study started last, None before the first."""
 
     @property
     def present(self) -> QueuedStudy | None:
@@ -58,21 +48,6 @@ class StudyProcess(Protocol):
     def queue(self, profile: str, edits: StudyEdits = NO_EDITS) -> None:
         """Start it after those before it; at once if none runs and none waits."""
 
-    def clear_queue(self) -> None:
-        """Forget the studies that wait."""
-
-    def waiting(self) -> tuple[str, ...]:
-        """The studies that wait, next one first, in words."""
-
-    def pause(self) -> None:
-        """Let the study that runs stand still."""
-
-    def go_on(self) -> None:
-        """Let it go on."""
-
-    def cancel(self) -> None:
-        """Stop the study that runs; finished runs are kept."""
-
     def resume(self) -> None:
         """Go on with the study started last, also before this page. Raises BackgroundError where there is none."""
 
@@ -81,12 +56,6 @@ class StudyProcess(Protocol):
 
     def retry(self) -> None:
         """Run it again with more seeds for replicates without a valid run. Raises BackgroundError where none is."""
-
-    def status(self) -> CommandStatus:
-        """State, progress and partial results."""
-
-    def finished(self) -> tuple[Path, ...]:
-        """Output folders of finished studies, newest first."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +73,7 @@ class QueuedStudy:
     study: Study
 
 
-class CalibrationProcess:
+class CalibrationProcess(OrderedCommands[QueuedStudy]):
     """``explorer calibrate`` as a child process.
 
     Args:
@@ -125,20 +94,12 @@ class CalibrationProcess:
         target: Path | None = None,
         place: PourPlace | None = None,
     ) -> None:
-        self.study_file, self._folder, self._store, self._target = study_file, folder, store, target
+        super().__init__(CommandProcess("study", ENDINGS, program), folder, RESULT, "studies")
+        self.study_file, self._store, self._target = study_file, store, target
         self._place = place or PourPlace()
-        self._process = CommandProcess("study", ENDINGS, program)
         self._profile, self._tries = "", TRIES
         self.present: QueuedStudy | None = None
         """The study that was started last, None where it was one of an earlier session of the page."""
-        self._line: WaitingLine[QueuedStudy] = WaitingLine(self._process, self._begin, "studies")
-        self.status, self.clear_queue = self._line.status, self._line.clear
-        self.cancel, self.pause, self.go_on = self._process.cancel, self._process.pause, self._process.go_on
-
-    @property
-    def out(self) -> Path | None:
-        """Output folder of the study started last."""
-        return self._process.out
 
     def start(self, profile: str, edits: StudyEdits = NO_EDITS, file: Path | None = None) -> None:
         """Start a new calibration with ``profile``.
@@ -151,11 +112,7 @@ class CalibrationProcess:
 
     def queue(self, profile: str, edits: StudyEdits = NO_EDITS) -> None:
         """Start it when those before it have ended."""
-        self._line.add(self._order(profile, edits))
-
-    def waiting(self) -> tuple[str, ...]:
-        """Profile of every study that waits, and whether it was changed."""
-        return tuple(f"{order.profile}{', changed' if order.text else ''}" for order in self._line.waiting)
+        self._add(self._order(profile, edits))
 
     def resume(self) -> None:
         """Go on where the last calibration was stopped, be it one of an earlier session of the page.
@@ -163,7 +120,8 @@ class CalibrationProcess:
         Runs that are in the store are not repeated.
         """
         self._process.refuse_while_running()
-        self._resume(self._last())
+        out = self._last()
+        self._go_on_in(out, self._arguments(out))
 
     def resumable(self) -> bool:
         """Whether the last one was stopped, in this session of the page or before."""
@@ -182,16 +140,7 @@ class CalibrationProcess:
             raise BackgroundError("nothing to try again: every replicate of the last study has a valid run")
         out = self._last()
         self._tries += TRIES
-        self._resume(out)
-
-    def close(self) -> None:
-        """Cancel what runs and wait for its end."""
-        self.clear_queue()
-        self._process.close()
-
-    def finished(self) -> tuple[Path, ...]:
-        """Output folders of finished studies, of any study file, newest first."""
-        return finished(self._folder, RESULT)
+        self._go_on_in(out, self._arguments(out))
 
     def _order(self, profile: str, edits: StudyEdits, other: Path | None = None) -> QueuedStudy:
         file = other or self.study_file
@@ -210,9 +159,12 @@ class CalibrationProcess:
             write_whole(out / f"{order.stem}{CHANGED}", order.text)
         if order.photographed is not None:
             order.photographed.copied(out / FOLDER)
-        self._process.start(out, self._arguments(out))
+        self._start(out, self._arguments(out))
         self.present = order
-        self._line.begun()
+
+    def _in_words(self, order: QueuedStudy) -> str:
+        """Its profile, and whether the study was changed."""
+        return f"{order.profile}{', changed' if order.text else ''}"
 
     def _last(self) -> Path:
         out = self._process.out
@@ -229,10 +181,6 @@ class CalibrationProcess:
         stems = {f"{self.study_file.stem}-{profile}": profile for profile in profiles}
         found = newest_unfinished(self._folder, tuple(stems), RESULT)
         return None if found is None else (found[0], stems[found[1]])
-
-    def _resume(self, out: Path) -> None:
-        self._process.resume(out, self._arguments(out))
-        self._line.begun()
 
     def _arguments(self, out: Path) -> list[str]:
         """The command line that is run, as a person would type it."""

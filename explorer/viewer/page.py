@@ -15,12 +15,13 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import viser
 from viser import _messages
 
-from explorer.background.command_process import CommandStatus, PourPlace
+from explorer.background.command_process import PourPlace
+from explorer.background.orders import BackgroundOrders
 from explorer.diagnosis.process import DiagnosisProcess
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, SessionState, Status
@@ -223,7 +224,7 @@ def browser_number(client_id: int) -> int:
 class OrderEvents:
     """Tells of what is there and was not the last time; ``commands``: name → what runs in the background."""
 
-    def __init__(self, commands: Mapping[str, BackgroundCommand]) -> None:
+    def __init__(self, commands: Mapping[str, BackgroundOrders]) -> None:
         self._commands = dict(commands)
         self._states = {name: command.status().state for name, command in self._commands.items()}
         self._generation: int | None = None
@@ -242,10 +243,3 @@ class OrderEvents:
             self._states[name] = now
             if now != before:
                 yield Event(status.generation, status.time, f"{name}: {now}", is_order=now in ASKED_FOR)
-
-
-class BackgroundCommand(Protocol):
-    """A study, or a diagnosis."""
-
-    def status(self) -> CommandStatus:
-        """State and progress."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import Protocol
 
 import viser
 
 from explorer.background.command_process import CommandStatus, PourPlace
 from explorer.background.events import FailedRun, failures
+from explorer.background.orders import BackgroundOrders
 from explorer.outcomes import outcome_text
 from explorer.viewer.actions import Action, Post, button_group
 
@@ -32,23 +32,7 @@ FAILURES_SHOWN = 6
 DONE, AT_WORK, TO_COME = "done", "▶", "–"
 
 
-class Orderly(Protocol):
-    """A command in the background that obeys."""
-
-    def pause(self) -> None:
-        """Let it stand still."""
-
-    def go_on(self) -> None:
-        """Let it go on."""
-
-    def cancel(self) -> None:
-        """Stop it."""
-
-    def clear_queue(self) -> None:
-        """Forget the orders that wait."""
-
-
-def orders(process: Orderly, start: Action, resume: Action, queue: Action) -> dict[str, Action]:
+def orders(process: BackgroundOrders, start: Action, resume: Action, queue: Action) -> dict[str, Action]:
     """What the buttons of ``process`` do; ``start``, ``resume`` and ``queue`` read what was chosen in the panel."""
     return {
         START: start,

@@ -10,8 +10,9 @@ import pytest
 
 from doe.studies.study import load_study
 from explorer.background import command_process
-from explorer.background.command_process import HERE, MOST_WAITING, BackgroundError, CommandStatus, PourPlace, advanced
+from explorer.background.command_process import HERE, BackgroundError, CommandStatus, PourPlace, advanced
 from explorer.background.events import ProgressEvent, StageProgress, failures, given_up, with_event
+from explorer.background.orders import MOST_WAITING
 from explorer.photograph.target import load_target, remove_target
 from explorer.priority import BACKGROUND
 from explorer.study.edit import StudyEdits

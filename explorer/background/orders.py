@@ -1,0 +1,130 @@
+"""Commands of one kind in the background, such as the studies: one runs at a time, others wait for it.
+
+The next order begins when the one before has come to its end: a report or a failure. A command that was cancelled
+leaves the line waiting for the next start, because who cancels wants quiet.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections import deque
+from dataclasses import replace
+from pathlib import Path
+from typing import Generic, Protocol, TypeVar
+
+from explorer.background.command_process import BackgroundError, CommandProcess, CommandStatus
+from explorer.background.output_folder import finished
+
+Order = TypeVar("Order")
+MOST_WAITING = 5
+
+
+class BackgroundOrders(Protocol):
+    """What the page needs of commands of one kind, wherever they run."""
+
+    @property
+    def out(self) -> Path | None:
+        """Output folder of the command started last, None before the first."""
+
+    def clear_queue(self) -> None:
+        """Forget the orders that wait."""
+
+    def waiting(self) -> tuple[str, ...]:
+        """The orders that wait, next one first, in words."""
+
+    def pause(self) -> None:
+        """Let the command that runs stand still."""
+
+    def go_on(self) -> None:
+        """Let it go on."""
+
+    def cancel(self) -> None:
+        """Stop it; finished pours are kept."""
+
+    def status(self) -> CommandStatus:
+        """State, progress and partial results."""
+
+    def finished(self) -> tuple[Path, ...]:
+        """Output folders of finished commands, newest first."""
+
+
+class OrderedCommands(ABC, Generic[Order]):
+    """Orders for ``process``, each with an output folder in ``folder``; a finished one has the file ``result`` there.
+
+    ``what``: the word for several of them, such as "studies".
+    """
+
+    def __init__(self, process: CommandProcess, folder: Path, result: str, what: str) -> None:
+        self._process, self._folder, self._result, self._what = process, folder, result, what
+        self._line: deque[Order] = deque()
+        self._follow_up = False
+        self.cancel, self.pause, self.go_on = process.cancel, process.pause, process.go_on
+
+    @property
+    def out(self) -> Path | None:
+        """Output folder of the command started last."""
+        return self._process.out
+
+    def finished(self) -> tuple[Path, ...]:
+        """Output folders of finished commands of this kind, newest first."""
+        return finished(self._folder, self._result)
+
+    def waiting(self) -> tuple[str, ...]:
+        """The orders that wait, next one first, in words."""
+        return tuple(map(self._in_words, self._line))
+
+    def clear_queue(self) -> None:
+        """Forget the orders that wait."""
+        self._line.clear()
+
+    def close(self) -> None:
+        """Cancel what runs and wait for its end."""
+        self.clear_queue()
+        self._process.close()
+
+    def status(self) -> CommandStatus:
+        """Status of the process; begins the next order where a command has ended since the last look."""
+        status = self._process.status()
+        if status.alive:
+            self._follow_up = True
+        elif self._follow_up:
+            self._follow_up = False
+            if self._line and status.state in ("finished", "failed"):
+                try:
+                    self._begin_next()
+                except (ValueError, OSError) as error:
+                    # Nobody pressed a button that could tell: the status does, and the order still waits.
+                    return replace(status, state="failed", message=f"the next one cannot start: {error}")
+                return self._process.status()
+        return status
+
+    @abstractmethod
+    def _begin(self, order: Order) -> None:
+        """Start the command of ``order`` by :meth:`_start`."""
+
+    @abstractmethod
+    def _in_words(self, order: Order) -> str:
+        """``order`` as it is told while it waits."""
+
+    def _add(self, order: Order) -> None:
+        """Begin ``order`` after those before it, at once if nothing runs. Raises BackgroundError if it is full."""
+        if len(self._line) >= MOST_WAITING:
+            raise BackgroundError(f"{MOST_WAITING} {self._what} wait already; more are not kept")
+        self._line.append(order)
+        if not self.status().alive:
+            self._begin_next()
+
+    def _begin_next(self) -> None:
+        """Begin the first order; it waits on where that fails."""
+        self._begin(self._line[0])
+        self._line.popleft()
+
+    def _start(self, out: Path, arguments: list[str]) -> None:
+        """Start a command; its end lets the next order begin, even if nobody looks in between."""
+        self._process.start(out, arguments)
+        self._follow_up = True
+
+    def _go_on_in(self, out: Path, arguments: list[str]) -> None:
+        """Resume one in its output folder; the same holds of its end."""
+        self._process.resume(out, arguments)
+        self._follow_up = True
