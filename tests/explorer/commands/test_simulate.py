@@ -107,7 +107,7 @@ def test_means_are_over_the_replicates_at_rest(record, monkeypatch):
 
 
 def test_table_for_people(record, monkeypatch):
-    monkeypatch.setattr("solver.pours.run.run_pours", lambda jobs, **options: iter([(0, record)]))
+    monkeypatch.setattr("explorer.simulation.run_pours", lambda jobs, **options: iter([(0, record)]))
     result = explorer("simulate", "funnel", *settings(TINY), "--seed", 5)
     assert result.exit_code == 0
     heading, row, message = result.stdout.splitlines()[:3]
@@ -142,7 +142,7 @@ def test_a_run_that_breaks_off_leaves_no_folder(failure, code, tmp_path, monkeyp
     def broken(jobs, **options):
         raise failure
 
-    monkeypatch.setattr("solver.pours.run.run_pours", broken)
+    monkeypatch.setattr("explorer.simulation.run_pours", broken)
     result = explorer("simulate", "funnel", "--out", tmp_path / "run")
     assert result.exit_code == code
     assert list(tmp_path.iterdir()) == []
@@ -155,7 +155,7 @@ def test_the_recordings_of_a_run_that_is_interrupted_are_named(tmp_path, monkeyp
         raise KeyboardInterrupt
 
     pours = run_pours
-    monkeypatch.setattr("solver.pours.run.run_pours", interrupted)
+    monkeypatch.setattr("explorer.simulation.run_pours", interrupted)
     result = explorer("simulate", "funnel", *settings(TINY), "--replicates", 2, "--record", tmp_path / "pour.rrd")
     assert result.exit_code == 130
     head, *files = result.stdout.splitlines()[-3:]
@@ -170,7 +170,7 @@ def test_the_recordings_of_a_run_that_is_interrupted_are_named(tmp_path, monkeyp
 
 
 def test_an_empty_folder_is_filled(record, tmp_path, monkeypatch):
-    monkeypatch.setattr("solver.pours.run.run_pours", lambda jobs, **options: iter([(0, record)]))
+    monkeypatch.setattr("explorer.simulation.run_pours", lambda jobs, **options: iter([(0, record)]))
     (tmp_path / "run").mkdir()
     assert explorer("simulate", "funnel", "--out", tmp_path / "run").exit_code == 0
     assert (tmp_path / "run" / "result.json").is_file()
