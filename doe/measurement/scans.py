@@ -120,8 +120,7 @@ class Scan:
         total = np.bincount(cell[near], weights=z[near], minlength=n * n)
         height = np.full(n * n, np.nan)
         height[count > 0] = total[count > 0] / count[count > 0]
-        axis = (np.arange(n) + 0.5 - n / 2) * pixel
-        return HeightMap(height.reshape(n, n), np.hypot(axis[:, None], axis[None, :]), pixel)
+        return HeightMap.of(height.reshape(n, n), pixel)
 
 
 def scan_files(folder: Path, conditions: Iterable[str]) -> tuple[dict[str, dict[int, Path]], tuple[Path, ...]]:

@@ -113,15 +113,16 @@ def _run(record: Record, values: dict[str, Value]) -> dict[str, Any]:
 def _energy(trace: Trace) -> dict[str, float | None]:
     put_in = trace.supplied_energy + trace.wall_work
     return {
-        "put_in_J": _finite(put_in[-1]),
-        "dissipated_J": _finite(trace.dissipated_energy[-1]),
-        "largest_error": _finite(np.abs(trace.energy_error).max()),
+        "put_in_J": finite_or_none(put_in[-1]),
+        "dissipated_J": finite_or_none(trace.dissipated_energy[-1]),
+        "largest_error": finite_or_none(np.abs(trace.energy_error).max()),
     }
 
 
 def _value(observed: Value) -> dict[str, float | None]:
-    return {"value": _finite(observed.value), "spread": _finite(observed.spread)}
+    return {"value": finite_or_none(observed.value), "spread": finite_or_none(observed.spread)}
 
 
-def _finite(number: float | None) -> float | None:
+def finite_or_none(number: float | None) -> float | None:
+    """A number as JSON has it: None for NaN and infinity."""
     return None if number is None or not math.isfinite(number) else float(number)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from explorer.files.run_folder import json_text, parameters_text
-from explorer.files.run_result import parameter_values, versions
+from explorer.files.run_result import finite_or_none, parameter_values, versions
 from explorer.tables.text_table import table_line, text_table
 from solver import Record, Scene
 from solver.observables import Value, observable_names, observe
@@ -107,23 +107,19 @@ def bench_data(scene: Scene, result: BenchResult) -> dict[str, Any]:
         "note": result.note,
         "quantities": {
             quantity.name: {
-                "value": _finite(quantity.value),
-                "reference": _finite(quantity.reference),
-                "error": _finite(quantity.error),
-                "spread": _finite(quantity.spread),
+                "value": finite_or_none(quantity.value),
+                "reference": finite_or_none(quantity.reference),
+                "error": finite_or_none(quantity.error),
+                "spread": finite_or_none(quantity.spread),
                 "unit": quantity.unit,
             }
             for quantity in result.quantities
         },
-        "series": {name: [_finite(number) for number in numbers] for name, numbers in result.series},
-        "table": {name: [_finite(number) for number in numbers] for name, numbers in result.table},
+        "series": {name: [finite_or_none(number) for number in numbers] for name, numbers in result.series},
+        "table": {name: [finite_or_none(number) for number in numbers] for name, numbers in result.table},
         "parameters": parameter_values(scene),
         "versions": versions(),
     }
-
-
-def _finite(number: float | None) -> float | None:
-    return None if number is None or not math.isfinite(number) else float(number)
 
 
 def bench_text(data: dict[str, Any]) -> str:

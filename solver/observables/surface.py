@@ -25,6 +25,12 @@ class HeightMap:
     pixel: float
     """[m]"""
 
+    @staticmethod
+    def of(height: Array, pixel: float) -> HeightMap:
+        """That of ``height`` (n, n) [m] in pixels of ``pixel`` [m], about the middle of the grid."""
+        axis = (np.arange(len(height)) + 0.5 - len(height) / 2) * pixel
+        return HeightMap(height, np.hypot(axis[:, None], axis[None, :]), pixel)
+
     def volume(self, within: float) -> float:
         """Volume between plate and surface where r < ``within`` [m]; [m³]."""
         return float(self.height[self.radius < within].sum()) * self.pixel**2
@@ -51,8 +57,7 @@ def height_map(spheres: Spheres, centre: Array, half_width: float, pixel: float)
         sphere, i, j = hit = np.nonzero((cap2 >= 0.0) & on_grid)
         top = spheres.centre[sphere, 2] + pixel * np.sqrt(cap2[hit])
         np.maximum.at(height, column[sphere, i] * n + row[sphere, j], top)
-    axis = (np.arange(n) + 0.5 - n / 2) * pixel
-    return HeightMap(height.reshape(n, n), np.hypot(axis[:, None], axis[None, :]), pixel)
+    return HeightMap.of(height.reshape(n, n), pixel)
 
 
 def coarsened(surface: HeightMap, times: int) -> HeightMap:
@@ -65,10 +70,7 @@ def coarsened(surface: HeightMap, times: int) -> HeightMap:
     known = np.isfinite(blocks)
     number = known.sum(axis=(1, 3))
     total = np.where(known, blocks, 0.0).sum(axis=(1, 3))
-    pixel = times * surface.pixel
-    axis = (np.arange(n) + 0.5 - n / 2) * pixel
-    height = np.where(number > 0, total / np.maximum(number, 1), np.nan)
-    return HeightMap(height, np.hypot(axis[:, None], axis[None, :]), pixel)
+    return HeightMap.of(np.where(number > 0, total / np.maximum(number, 1), np.nan), times * surface.pixel)
 
 
 def radial_profile(surface: HeightMap, ring_width: float, rings: int) -> tuple[Array, Array]:
