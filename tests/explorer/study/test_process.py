@@ -15,6 +15,7 @@ from explorer.background.events import ProgressEvent, StageProgress, failures, g
 from explorer.background.orders import MOST_WAITING
 from explorer.photograph.target import load_target, remove_target
 from explorer.priority import BACKGROUND
+from explorer.study import process as study_process
 from explorer.study.edit import StudyEdits
 from explorer.study.process import CalibrationProcess
 from solver import asset_path
@@ -252,24 +253,30 @@ def test_a_failed_study_does_not_hold_up_the_queue_and_it_can_be_cleared(tmp_pat
     process.queue("standard")
     wait_for(lambda: process.status().state == "finished")
     assert "-standard-" in process.out.name
-    for _ in range(MOST_WAITING + 1):
-        process._line._waiting.append(None)
+
+
+def test_a_line_that_is_full_takes_no_more(tmp_path):
+    process = study(tmp_path, "time.sleep(60)")
+    process.start("quick")
+    for _ in range(MOST_WAITING):
+        process.queue("standard")
     with pytest.raises(BackgroundError, match="wait already"):
-        process.queue("quick")
+        process.queue("full")
+    assert process.waiting() == ("standard",) * MOST_WAITING
+    process.close()
 
 
-def test_an_order_that_cannot_begin_waits_on_and_says_so(tmp_path):
+def test_an_order_that_cannot_begin_waits_on_and_says_so(tmp_path, monkeypatch):
     process = study(tmp_path, "time.sleep(0.3)")
     process.start("quick")
     process.queue("standard")
-    begin = process._line._begin
 
-    def refused(order):
+    def refused(folder, stem):
         raise OSError("No space left on device")
 
-    process._line._begin = refused
-    wait_for(lambda: process.status().state == "failed")
-    process._line._begin = begin
+    with monkeypatch.context() as full:
+        full.setattr(study_process, "new_folder", refused)
+        wait_for(lambda: process.status().state == "failed")
     assert process.waiting() == ("standard",)
     process.start("quick")
     wait_for(lambda: process.status().state == "finished" and process.waiting() == ())

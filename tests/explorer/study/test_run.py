@@ -31,7 +31,7 @@ pytestmark = pytest.mark.usefixtures("unprinted")
 class Formula(FormulaRunner):
     """Takes the arguments of a PourRunner and tells its progress in the same way."""
 
-    def __init__(self, scene, store, study, seed, threads, on_run, observer, pours, tries, experiments):
+    def __init__(self, scene, store, study, seed, threads, on_run, observer, pours, tries, experiments, watched):
         super().__init__(planted, sigma=0.5)
         assert not experiments
         self._on_run = on_run
