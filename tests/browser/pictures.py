@@ -127,9 +127,9 @@ def camera(
 
 
 def first_visit(browser: Browser, home: Path) -> None:
-    """Before the solver is there."""
+    """Before the solver is there, which has to be compiled first."""
     with (
-        served("--store", home / "runs.sqlite", data=home, patience=30) as address,
+        served("--store", home / "runs.sqlite", data=home, kernels=home / "kernels", patience=30) as address,
         camera(browser, address, begun=False) as view,
     ):
         view.take("start")
@@ -336,8 +336,11 @@ def side_by_side(view: Camera) -> None:
     view.page.locator("#state-line").get_by_label("Dark or light page").click()
     for size in (WIDE, SMALL, PHONE):
         view.page.set_viewport_size({"width": size[0], "height": size[1]})
+        if size == PHONE:
+            view.page.get_by_text("Granular material explorer").click()  # folds the sheet, which covers the piles
         view.take(f"diagnose_side_by_side_{size[0]}", 4.0)
     view.page.set_viewport_size({"width": USUAL[0], "height": USUAL[1]})
+    view.open("Diagnose")
     view.press("Back to my pour")
     time.sleep(5.0)
     view.settled()

@@ -21,16 +21,17 @@ def diagnosed(data):
 
 
 @contextmanager
-def served(*arguments, data=None, patience=20.0):
+def served(*arguments, data=None, kernels=None, patience=20.0):
     """Address of a page of ``explorer serve`` with ``arguments``; it has to end well within ``patience`` [s].
 
-    ``data`` stands in for the folder of the user's data.
+    ``data`` stands in for the folder of the user's data, ``kernels`` for that of compiled ones.
     """
+    folders = {"XDG_DATA_HOME": data, "TI_OFFLINE_CACHE_FILE_PATH": kernels}
     server = subprocess.Popen(
         [sys.executable, "-m", "explorer", "serve", "--port", "0", *map(str, arguments)],
         stdout=subprocess.PIPE,
         text=True,
-        env=os.environ | ({} if data is None else {"XDG_DATA_HOME": str(data)}),
+        env=os.environ | {name: str(folder) for name, folder in folders.items() if folder is not None},
     )
     try:
         found = re.search(r"http://\S+", server.stdout.readline())
