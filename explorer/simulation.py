@@ -120,19 +120,18 @@ def run_simulation(
     ``table`` is told of every pour as it ends, ``say`` of what was recorded, also where the pours are cut off.
     """
     scene, seeds, n = simulation.scene, simulation.seeds, len(simulation.seeds)
+    if order.record:
+        # rerun takes a second to import; only those who record pay for it.
+        from explorer.recordings.pour_recorder import recorder_of
+        from explorer.recordings.recording import recorded_lines
     started = perf_counter()
     with ExitStack() as stack:
         folder = stack.enter_context(appearing(order.out)) if order.out else None
         reporter.begin(resumed=order.resume is not None)
         progress = PourProgress(reporter)
         progress.compiling()
-        recorder = None
-        if order.record:
-            # rerun takes a second to import; only those who record pay for it.
-            from explorer.recordings.pour_recorder import recorder_of
-            from explorer.recordings.recording import recorded_lines
-
-            recorder = recorder_of(order.record, seeds)
+        recorder = recorder_of(order.record, seeds) if order.record else None
+        if recorder:
             if table:
                 # Called once the files are closed, also after Ctrl-C.
                 stack.callback(lambda: say("\n".join(recorded_lines(recorder.pours))))

@@ -117,6 +117,15 @@ def write_next(
         write_whole(made / ORDER, json.dumps(plain(order), ensure_ascii=False, indent=1) + "\n")
 
 
+def asks_for(folder: Path, suggestion: Suggestion) -> bool:
+    """Whether the follow-up in ``folder`` is ``suggestion``, for the same answers."""
+    try:
+        order = json.loads(read_text(folder / ORDER, MOST_BYTES, CommandError))
+        return (order["change"], tuple(order["rivals"])) == (suggestion.experiment.name, tuple(suggestion.rivals))
+    except (ValueError, KeyError, TypeError):  # whatever it is, somebody has changed it
+        return False
+
+
 def read_next(folder: Path) -> NextFolder:
     """The follow-up in ``folder``, filled in.
 

@@ -30,7 +30,7 @@ from explorer.background.output_folder import kept_for_one, read_result
 from explorer.background.progress import PourProgress
 from explorer.background.reporter import Reporter
 from explorer.diagnosis.corrected import corrected_toml, study_toml
-from explorer.diagnosis.next_folder import ORDER, read_next, write_next
+from explorer.diagnosis.next_folder import ORDER, asks_for, read_next, write_next
 from explorer.diagnosis.result import (
     CORRECTED,
     CORRECTED_STUDY,
@@ -200,7 +200,8 @@ def _run(
     if found.suggestions:
         following = order.out / "next"
         if (following / ORDER).is_file():  # of a run that was stopped later, or one that is gone on with
-            say(f"{following}: is there already and stays as it is, for somebody may have filled it in")
+            same = "" if asks_for(following, found.suggestions[0]) else "; it is not what this answer asks for"
+            say(f"{following}: is there already and stays as it is, for somebody may have filled it in{same}")
         else:
             joined_names = [condition.name for condition in found.conditions]
             write_next(following, order.folder, as_declared, found.suggestions[0], order.given, joined_names)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from itertools import count
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
@@ -129,6 +130,11 @@ def _angle_deg(pour: Pour) -> float:
     return angle_of_repose(PileReading(pile)).value
 
 
+def _aside(path: Path) -> Path:
+    """A name beside ``path`` that nobody has."""
+    return next(one for n in count(1) if not (one := path.with_stem(f"{path.stem}_before_{n}")).exists())
+
+
 def check_recordings(folder: Path, resume: bool) -> None:
     """Refuse a ``folder`` with recordings of a verification, unless the study is gone on with."""
     if not resume and (found := sorted(folder.glob(f"{RECORDED_STAGE}_*.rrd"))):
@@ -138,7 +144,8 @@ def check_recordings(folder: Path, resume: bool) -> None:
 class StudyRecorder:
     """Observer of a study's pours that records those of the verification into ``folder``.
 
-    The file of a pour that is made anew, as of one that was cut off, is written anew.
+    A file of the same name, as that of a pour that was cut off and is made anew, stays beside it with ``_before_1`` in
+    its name: it may be of another study.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -153,7 +160,8 @@ class StudyRecorder:
             return
         if seed not in self._recorders:
             path = self._folder / f"{RECORDED_STAGE}_{seed}.rrd"
-            path.unlink(missing_ok=True)
+            if path.exists():
+                path.rename(_aside(path))
             self._recorders[seed] = self._stack.enter_context(recorder_of(path, [seed]))
         self._recorders[seed].sample(0, pour)
 

@@ -265,5 +265,10 @@ def test_a_diagnosis_gone_on_with_leaves_a_follow_up_that_is_filled_in(tmp_path,
     measured = table.read_text()
     again = explorer(*words, "--resume")
     assert again.exit_code == 0, again.stderr
-    assert f"{out}/next: is there already and stays as it is" in " ".join((again.stdout + again.stderr).split())
+    told = f"{out}/next: is there already and stays as it is, for somebody may have filled it in"
+    assert told in again.stdout
+    assert "not what this answer asks for" not in again.stdout
     assert table.read_text() == measured
+    order = out / "next/follow_up.json"
+    order.write_text(order.read_text().replace('"change": "', '"change": "another one, '))
+    assert f"{told}; it is not what this answer asks for" in explorer(*words, "--resume").stdout

@@ -31,7 +31,7 @@ def test_only_verification_pours_are_recorded(tmp_path):
 
 
 @pytest.mark.usefixtures("taichi")
-def test_the_recording_of_a_pour_that_was_cut_off_is_made_anew(tmp_path):
+def test_the_recording_of_a_pour_that_was_cut_off_is_made_anew_and_none_is_lost(tmp_path):
     scene = with_values(load_material("sunflower_extract"), TINY)
     store = Store(tmp_path / "runs.sqlite")
     seed = seed_of(1, "verification", 0, 0, 0)
@@ -42,3 +42,4 @@ def test_the_recording_of_a_pour_that_was_cut_off_is_made_anew(tmp_path):
         (run,) = runner.run("verification", [Setting("optimum", {}, 1)])[0][:1]
     assert run.seed == seed
     assert any(chunk.entity_path.startswith("/world") for chunk in RrdReader(str(cut)).stream())
+    assert (tmp_path / f"verification_{seed}_before_1.rrd").read_bytes() == b"RRF2"
