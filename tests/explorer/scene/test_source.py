@@ -7,7 +7,6 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-import solver
 from explorer.cli import app
 from explorer.errors import CommandError
 from explorer.scene.file import study_path, with_settings
@@ -36,7 +35,7 @@ def asked(monkeypatch):
         jobs.extend(asked_for)
         raise typer.Exit(0)
 
-    monkeypatch.setattr(solver, "run_pours", pours, raising=False)
+    monkeypatch.setattr("explorer.simulation.run_pours", pours)
     return jobs
 
 
