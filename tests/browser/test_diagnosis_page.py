@@ -2,7 +2,8 @@
 
 import pytest
 
-from tests.browser.served import diagnosed, served
+from explorer import load_diagnosis
+from tests.browser.served import EXAMPLE, diagnosed, served
 from tests.browser.test_page import BEGUN, PATIENCE, SETTINGS, room, wait_for
 
 pytestmark = pytest.mark.browser
@@ -32,7 +33,8 @@ def test_the_board_names_the_effect_with_its_charts(page):
     # A chart is drawn once it comes into sight.
     board.locator("figure").first.scroll_into_view_if_needed()
     board.locator("figure .js-plotly-plot").first.wait_for()
-    assert "with probability 96.7 %" in board.locator("body").inner_text()
+    probability = load_diagnosis(EXAMPLE).effects[0].probability
+    assert f"with probability {100 * probability:.1f} %" in board.locator("body").inner_text()
     page.locator("#state-line").get_by_text("Trefoil pour 2").wait_for()
 
 
