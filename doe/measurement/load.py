@@ -38,6 +38,8 @@ from solver import (
 )  # fmt: skip
 
 FILE = "measurement.toml"
+WRONG = (ParameterError, StudyFileError, MeasurementError, AssetNotFoundError)
+"""What the contents of a file can raise."""
 
 
 class MeasurementFile(TomlTable):
@@ -65,8 +67,7 @@ def load_measurement(folder: Path) -> Measurement:
     if not folder.is_dir():
         raise MeasurementError(f"{folder}: no such folder")
     path = folder / FILE
-    errors = ParameterError, StudyFileError, MeasurementError, AssetNotFoundError
-    with naming_file(path, *errors, raised=MeasurementError, within=path.parent):
+    with naming_file(path, *WRONG, raised=MeasurementError, within=path.parent):
         table = read_toml(path)
         outside = [f"{key}: {file} is outside the folder" for key, file in outside_files(folder, table)]
         return _read(folder, table, outside)
@@ -221,5 +222,5 @@ def _within(name: str | None) -> Iterator[None]:
     """Put the condition in front of an error about it."""
     try:
         yield
-    except (ParameterError, StudyFileError, MeasurementError, AssetNotFoundError) as error:
+    except WRONG as error:
         raise MeasurementError(f"condition {name!r}: {error}" if name else f"condition: {error}") from None
