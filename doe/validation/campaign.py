@@ -30,7 +30,7 @@ from doe.measurement.features import SCALARS, SCAN, feature_set
 from doe.store import Store, default_store
 from doe.validation.laboratory import TREFOILS, Laboratory, LaboratoryPour, read_laboratory
 from doe.validation.limit import limit_study
-from doe.validation.outside import AMPLITUDE, DEVELOPMENT, possible
+from doe.validation.outside import possible_outside
 from doe.validation.reference import ROOT as REFERENCE_ROOT
 from doe.validation.reference import extended_to, kept
 from doe.validation.scanner import Scanner
@@ -82,7 +82,7 @@ class CampaignOrder:
 
     def asked(self, laboratory: Laboratory) -> tuple[Case, ...]:
         """The data sets."""
-        kinds = possible(laboratory.declared.scene, DEVELOPMENT if self.wide else tuple(AMPLITUDE))
+        kinds = possible_outside(laboratory.declared.scene, development=self.wide)
         found = self.cases or tuple(cases(self.root, self.number, kinds, self.wide))
         return found[self.shard - 1 :: self.of]
 

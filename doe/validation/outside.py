@@ -1,43 +1,17 @@
-"""Effects that no library holds, so that a diagnosis has to say "unexplained".
+"""Effects that no library holds, so that a diagnosis has to say "unexplained": ``OUTSIDE_EFFECTS``, one value each.
 
-    vibrating_plate    the plate goes up and down by a square wave of speed, 50 Hz
-    plate_attraction   bodies near the plate are drawn to it, q m g exp(−z/λ)
-    misread_scale      every length that is read off the pile is too large by one factor
-    breaking_bodies    a share of the mass is single lobes instead of trefoils
-    sticky_funnel      a share of the mass stays in the funnel for good, whatever the rest does
-    turning_plate      the plate turns about the funnel's axis
-    draught            air moves sideways above the plate and drags what falls through it
-    short_charge       less was weighed in than was written down
-    raised_funnel      the funnel stands higher than was written down
-    stray_spheres      a share of the mass is spheres of the bodies' own mass and solid volume
-
-The first five are for development; a test (``truth.py``) has all ten. Each pour is driven by hand in a process of
-its own (``work_place``), and gives an ordinary record.
+Some are for development, and a test (``truth.py``) has all. Each pour is driven by hand in a process of its own
+(``work_place``), and gives an ordinary record.
 """
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from solver import Batch, Members, Pour, Record, Scene, capacity_for, parameters, poured_mass, value, with_values
 
-AMPLITUDE = {
-    "vibrating_plate": 0.05,
-    "plate_attraction": 4.0,
-    "misread_scale": 0.10,
-    "breaking_bodies": 0.18,
-    "sticky_funnel": 0.07,
-    "turning_plate": 2.5,
-    "draught": 3.0,
-    "short_charge": 0.2,
-    "raised_funnel": 0.5,
-    "stray_spheres": 0.3,
-}
-"""Speed [m/s], q, factor − 1, shares, rate [rad/s], acceleration [m/s²], share left out, factor − 1, share: chosen
-once, before any diagnosis was asked, so that each moves the summaries by more than 10 standard errors."""
-DEVELOPMENT = ("vibrating_plate", "plate_attraction", "misread_scale", "breaking_bodies", "sticky_funnel")
-"""The kinds that a development campaign asks for."""
 OUTSIDE = 1
 """Version of this file: raise it with every change to what one of its pours does."""
 PLATE = 0
@@ -49,44 +23,55 @@ REACH = 0.02
 KICK = 1e-3
 """Interval [s] at which the attraction acts."""
 
-ON_BENCH = ("draught",)
-"""Those that act the other way in the frame of a rig that is turned by 180° on its bench."""
-POURED = ("sticky_funnel", "draught", "raised_funnel")
-"""Those that need an outlet."""
-CLUMPS = ("breaking_bodies", "stray_spheres")
-"""Those that need bodies of member spheres."""
+
+@dataclass(frozen=True, kw_only=True)
+class OutsideEffect:
+    """One effect that the library lacks.
+
+    Attributes
+    ----------
+    name
+        Of the files of a campaign.
+    amount
+        By how much it acts, in the unit that ``pour`` takes; chosen once, before any diagnosis was asked, so that it
+        moves the summaries by more than 10 standard errors.
+    pour
+        Scene, seed, amount → the record of a pour in which it acts.
+    seen
+        Record, amount → what the laboratory reads instead of that record; None: the record.
+    development
+        Whether a development campaign asks for it.
+    has_direction
+        Whether it acts the other way in the frame of a rig that is turned by 180° on its bench.
+    needs_outlet, needs_clump
+        Whether there has to be a funnel, or bodies of member spheres.
+    """
+
+    name: str
+    amount: float
+    pour: Callable[[Scene, int, float], Record]
+    seen: Callable[[Record, float], Record] | None = None
+    development: bool = False
+    has_direction: bool = False
+    needs_outlet: bool = False
+    needs_clump: bool = False
+
+    def possible(self, scene: Scene) -> bool:
+        """Whether it can act in ``scene``."""
+        outlet, clump = "rig.outlet_height" in parameters(scene), isinstance(scene.bodies[0].shape, Members)
+        return (outlet or not self.needs_outlet) and (clump or not self.needs_clump)
 
 
-def possible(scene: Scene, kinds: Sequence[str]) -> tuple[str, ...]:
-    """Those of ``kinds`` that there can be in ``scene``."""
-    outlet, clump = "rig.outlet_height" in parameters(scene), isinstance(scene.bodies[0].shape, Members)
-    return tuple(kind for kind in kinds if (outlet or kind not in POURED) and (clump or kind not in CLUMPS))
+def possible_outside(scene: Scene, development: bool = False) -> tuple[str, ...]:
+    """Names of those that can act in ``scene``; ``development``: only of those that are for it."""
+    return tuple(
+        one.name for one in OUTSIDE_EFFECTS.values() if one.possible(scene) and (one.development or not development)
+    )
 
 
 def outside_pour(name: str, scene: Scene, seed: int, amount: float) -> Record:
     """The record of one pour of ``scene`` in which the outside effect ``name`` acts by ``amount``."""
-    if name == "misread_scale":
-        # The pour is as declared; the scale is misread when its pile is read (`magnified`).
-        return driven(scene, seed)
-    if name == "breaking_bodies":
-        return driven(broken(scene, amount), seed)
-    if name == "sticky_funnel":
-        stuck = amount * poured_mass(scene)
-        return with_stuck(driven(with_values(scene, {"rig.mass": poured_mass(scene) - stuck}), seed), stuck)
-    if name == "short_charge":
-        return driven(with_values(scene, {"rig.mass": (1.0 - amount) * poured_mass(scene)}), seed)
-    if name == "raised_funnel":
-        height = float(value(scene, "rig.outlet_height"))
-        return driven(with_values(scene, {"rig.outlet_height": (1.0 + amount) * height}), seed)
-    if name == "stray_spheres":
-        return driven(with_spheres(scene, amount), seed)
-    act, every = {
-        "vibrating_plate": (vibrate, HALF_PERIOD),
-        "plate_attraction": (attract, KICK),
-        "turning_plate": (turn, HALF_PERIOD),
-        "draught": (blow, KICK),
-    }[name]
-    return driven(scene, seed, lambda batch, pour: act(batch, pour, amount), every)
+    return OUTSIDE_EFFECTS[name].pour(scene, seed, amount)
 
 
 def driven(scene: Scene, seed: int, act: Callable[[Batch, Pour], None] | None = None, every: float = np.inf) -> Record:
@@ -172,3 +157,67 @@ def with_stuck(record: Record, stuck: float) -> Record:
     """``record`` with ``stuck`` [kg] that entered and never left, and counts as poured."""
     trace = dataclasses.replace(record.trace, entered_mass=record.trace.entered_mass + stuck)
     return dataclasses.replace(record, trace=trace, poured_mass=record.poured_mass + stuck)
+
+
+def _acted_on(act: Callable[[Batch, Pour, float], None], every: float) -> Callable[[Scene, int, float], Record]:
+    """Pours on which ``act`` acts every ``every`` seconds."""
+    return lambda scene, seed, amount: driven(scene, seed, lambda batch, pour: act(batch, pour, amount), every)
+
+
+def _without(scene: Scene, seed: int, share: float) -> Record:
+    return driven(with_values(scene, {"rig.mass": (1.0 - share) * poured_mass(scene)}), seed)
+
+
+def _sticking(scene: Scene, seed: int, share: float) -> Record:
+    stuck = share * poured_mass(scene)
+    return with_stuck(driven(with_values(scene, {"rig.mass": poured_mass(scene) - stuck}), seed), stuck)
+
+
+def _raised(scene: Scene, seed: int, share: float) -> Record:
+    height = float(value(scene, "rig.outlet_height"))
+    return driven(with_values(scene, {"rig.outlet_height": (1.0 + share) * height}), seed)
+
+
+OUTSIDE_EFFECTS = {
+    one.name: one
+    for one in (
+        # The plate goes up and down by a square wave of speed [m/s], 50 Hz.
+        OutsideEffect(name="vibrating_plate", amount=0.05, pour=_acted_on(vibrate, HALF_PERIOD), development=True),
+        # Bodies near the plate are drawn to it, q m g exp(−z/λ).
+        OutsideEffect(name="plate_attraction", amount=4.0, pour=_acted_on(attract, KICK), development=True),
+        # Every length that is read off the pile is too large by one factor. The pour is as declared.
+        OutsideEffect(
+            name="misread_scale",
+            amount=0.10,
+            pour=lambda scene, seed, amount: driven(scene, seed),
+            seen=lambda record, amount: magnified(record, 1.0 + amount),
+            development=True,
+        ),
+        # A share of the mass is single lobes instead of trefoils.
+        OutsideEffect(
+            name="breaking_bodies",
+            amount=0.18,
+            pour=lambda scene, seed, share: driven(broken(scene, share), seed),
+            development=True,
+            needs_clump=True,
+        ),
+        # A share of the mass stays in the funnel for good, whatever the rest does.
+        OutsideEffect(name="sticky_funnel", amount=0.07, pour=_sticking, development=True, needs_outlet=True),
+        # The plate turns about the funnel's axis [rad/s].
+        OutsideEffect(name="turning_plate", amount=2.5, pour=_acted_on(turn, HALF_PERIOD)),
+        # Air moves sideways above the plate and drags what falls through it [m/s²].
+        OutsideEffect(name="draught", amount=3.0, pour=_acted_on(blow, KICK), has_direction=True, needs_outlet=True),
+        # A share less was weighed in than was written down.
+        OutsideEffect(name="short_charge", amount=0.2, pour=_without),
+        # The funnel stands higher than was written down, by a share of its height.
+        OutsideEffect(name="raised_funnel", amount=0.5, pour=_raised, needs_outlet=True),
+        # A share of the mass is spheres of the bodies' own mass and solid volume.
+        OutsideEffect(
+            name="stray_spheres",
+            amount=0.3,
+            pour=lambda scene, seed, share: driven(with_spheres(scene, share), seed),
+            needs_clump=True,
+        ),
+    )
+}
+"""By name, in the order in which a campaign asks for them."""

@@ -18,7 +18,7 @@ from doe.measurement import Condition, readings_of_record
 from doe.pour_runner import Pours, stored_run
 from doe.store import Store
 from doe.validation.laboratory import LaboratoryPour
-from doe.validation.outside import AMPLITUDE, ON_BENCH, OUTSIDE, magnified, outside_pour
+from doe.validation.outside import OUTSIDE, OUTSIDE_EFFECTS, outside_pour
 from solver import Executor, Job, Outcome, Record, Scene, begin_worker, executor, pour_key, unpacked
 
 
@@ -38,8 +38,8 @@ class PourOrder:
     @property
     def amount(self) -> float:
         """By how much the outside effect acts."""
-        sign = -1.0 if self.condition.turned and self.outside in ON_BENCH else 1.0
-        return sign * AMPLITUDE[self.outside]
+        effect = OUTSIDE_EFFECTS[self.outside]
+        return -effect.amount if self.condition.turned and effect.has_direction else effect.amount
 
     @property
     def variant(self) -> str:
@@ -53,7 +53,8 @@ class PourOrder:
 
     def seen(self, record: Record) -> Record:
         """The pour as the laboratory sees it."""
-        return magnified(record, 1.0 + AMPLITUDE[self.outside]) if self.outside == "misread_scale" else record
+        seen = OUTSIDE_EFFECTS[self.outside].seen if self.outside else None
+        return record if seen is None else seen(record, self.amount)
 
     def reader(self, record: Record) -> dict[str, float]:
         """What the laboratory reads off a pour that it sees."""

@@ -42,6 +42,7 @@ from explorer.photograph.annotated import sheet
 from explorer.photograph.marks import UNMARKED, Marks
 from explorer.photograph.result import MeasuredPhotographs
 from explorer.photograph.run import MeasureOrder, measure_order, outline_text, run_measure
+from explorer.photograph.simulated import SimulatedViews
 from explorer.photograph.target import PhotographedTarget, check_targets, keep_target
 from explorer.report.bench import bench_record, bench_report
 from explorer.report.design import design_html
@@ -51,7 +52,7 @@ from explorer.report.html import page
 from explorer.report.study_charts import Plot, Plots
 from explorer.scene.source import command_line, rig_source
 from explorer.tables.laboratory import lab_text
-from explorer.tables.photograph import NOTE, Rows, measure_result, measure_tables
+from explorer.tables.photograph import NOTE, Rows, measure_tables
 from explorer.tables.pours import bench_text
 from solver import Scene, read_toml, with_values
 from solver.assets import asset_path, photograph_scales, shipped_assets
@@ -191,7 +192,7 @@ def photograph_result(read: PhotographReading) -> CommandResult:
     if measured.piles and read.ruler.known:
         files[f"{stem}_outline.csv"] = outline_text(measured.piles[0]).encode()
     picture = np.asarray(drawn, dtype=np.uint8)
-    return CommandResult("", shlex.join(words), {}, files, picture, measure_tables(measure_result(measured)), NOTE)
+    return CommandResult("", shlex.join(words), {}, files, picture, measure_tables(measured), NOTE)
 
 
 def compared_result(read: PhotographReading, scene: Scene, folder: Path) -> CommandResult:
@@ -203,7 +204,8 @@ def compared_result(read: PhotographReading, scene: Scene, folder: Path) -> Comm
         content = drawn.read_bytes()
         with Image.open(drawn) as picture:
             pixels = np.asarray(picture.convert("RGB"), dtype=np.uint8)
-    return CommandResult("", shlex.join(["explorer", *words]), {}, {PLOT: content}, pixels, measure_tables(data), NOTE)
+    tables = measure_tables(read.measured, SimulatedViews.from_dict(data["simulation"]))
+    return CommandResult("", shlex.join(["explorer", *words]), {}, {PLOT: content}, pixels, tables, NOTE)
 
 
 def measured_target(read: PhotographReading, folder: Path, targets: Sequence[Target], anew: bool) -> PhotographedTarget:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 from scipy import stats
@@ -26,6 +27,34 @@ BASES = {
 }
 
 
+@dataclass(frozen=True)
+class OverPictures(Record):
+    """Mean angle over ``n`` pictures, SD, and the 95 % interval of the mean (Student's t); NaN below two pictures."""
+
+    n: int
+    mean_deg: float
+    sd_deg: float
+    interval_deg: tuple[float, float]
+
+    @classmethod
+    def of(cls, angles_deg: Sequence[float]) -> Self:
+        """Over one angle a picture."""
+        n = len(angles_deg)
+        mean = float(np.mean(angles_deg)) if n else math.nan
+        if n < 2:
+            return cls(n, mean, math.nan, (math.nan, math.nan))
+        sd = float(np.std(angles_deg, ddof=1))
+        reach = float(stats.t.ppf(0.975, n - 1)) * sd / math.sqrt(n)
+        return cls(n, mean, sd, (mean - reach, mean + reach))
+
+    def __str__(self) -> str:
+        low, high = self.interval_deg
+        return (
+            f"{self.n} pictures: mean {self.mean_deg:.2f}°, SD {self.sd_deg:.2f}°, 95 % {low:.2f} … {high:.2f}° "
+            "(Student's t over the pictures)"
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class MeasuredPhotographs:
     """What came out, in the order of the pictures."""
@@ -44,6 +73,11 @@ class MeasuredPhotographs:
     def refusals(self) -> tuple[Refusal, ...]:
         """Of the others."""
         return tuple(reading for reading in self.readings if isinstance(reading, Refusal))
+
+    @property
+    def over_pictures(self) -> OverPictures:
+        """Over the piles."""
+        return OverPictures.of([pile.angles.mean.value_deg for pile in self.piles])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,13 +131,9 @@ class PhotographResult(Document):
     """What was poured beside it, if anything."""
 
     @property
-    def over_pictures(self) -> tuple[float, float, float]:
-        """Mean over the pictures, SD, and half the 95 % interval of the mean (Student's t) [°]; NaN below two."""
-        means = np.array([pile.mean[0] for pile in self.piles])
-        if means.size < 2:
-            return (float(means[0]) if means.size else math.nan), math.nan, math.nan
-        sd = float(means.std(ddof=1))
-        return float(means.mean()), sd, float(stats.t.ppf(0.975, means.size - 1)) * sd / math.sqrt(means.size)
+    def over_pictures(self) -> OverPictures:
+        """Over the piles."""
+        return OverPictures.of([pile.mean[0] for pile in self.piles])
 
 
 def photograph_result(measured: MeasuredPhotographs, author: str, notes: str) -> PhotographResult:

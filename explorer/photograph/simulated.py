@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from doe.record import Record
 from explorer.errors import CommandError
 from explorer.outcomes import outcome_text
 from explorer.scene.file import load_scene
@@ -16,6 +18,28 @@ from solver.pours.record import Spheres
 
 Array = npt.NDArray[np.float64]
 SEED = 1
+
+
+@dataclass(frozen=True)
+class Spread(Record):
+    """Mean over views, and their standard deviation; NaN of one view."""
+
+    mean: float
+    sd: float = math.nan
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulatedViews(Record):
+    """What ``views`` of ``piles`` of one source show: "simulation" in what ``explorer measure --json`` prints."""
+
+    source: str
+    piles: int
+    views: int
+    left_deg: Spread
+    right_deg: Spread
+    mean_deg: Spread
+    height_mm: Spread
+    half_width_mm: Spread
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +55,20 @@ class SimulatedPiles:
     half_width: Array
     front: Outline
     """The first view, to be drawn."""
+
+    @property
+    def summary(self) -> SimulatedViews:
+        """Over all views."""
+        return SimulatedViews(
+            source=self.source,
+            piles=self.piles,
+            views=int(self.height.size),
+            left_deg=_spread(self.left_deg),
+            right_deg=_spread(self.right_deg),
+            mean_deg=_spread(0.5 * (self.left_deg + self.right_deg)),
+            height_mm=_spread(1e3 * self.height),
+            half_width_mm=_spread(1e3 * self.half_width),
+        )
 
 
 def simulated_piles(source: str) -> SimulatedPiles:
@@ -53,6 +91,10 @@ def simulated_piles(source: str) -> SimulatedPiles:
         half_width=0.5 * (feet[:, 1] - feet[:, 0]),
         front=sloping[0][0],
     )
+
+
+def _spread(values: Array) -> Spread:
+    return Spread(float(values.mean()), float(values.std(ddof=1)) if values.size > 1 else math.nan)
 
 
 def _spheres(source: str) -> list[Spheres]:

@@ -70,12 +70,12 @@ class PhotographedTarget:
     @property
     def mean(self) -> float:
         """Mean angle over the photographs."""
-        return self.result.over_pictures[0]
+        return self.result.over_pictures.mean_deg
 
     @property
     def sd(self) -> float:
         """Standard deviation between piles; of one photograph the standard error of reading it."""
-        return self.result.over_pictures[1] if self.n > 1 else self.result.piles[0].mean[1] / COVERAGE
+        return self.result.over_pictures.sd_deg if self.n > 1 else self.result.piles[0].mean[1] / COVERAGE
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -135,7 +135,8 @@ def banner(result: PhotographResult) -> Banner:
             f"{first}: {why}" if lost == 1 else f"None of {lost} pictures shows a pile that can be read.",
             "Take the picture again as its refusal says." if lost == 1 else "Take them again as their refusals say.",
         )
-    mean, sd, half = result.over_pictures
+    over = result.over_pictures
+    mean, sd, half = over.mean_deg, over.sd_deg, over.interval_deg[1] - over.mean_deg
     beside = f" {lost} more show none that can be read." if lost else ""
     if n == 1:
         return Banner(

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-from scipy import stats
 
 from explorer.photograph.result import BASES, MeasuredPhotographs
-from explorer.photograph.simulated import SimulatedPiles
+from explorer.photograph.simulated import SimulatedViews, Spread
 from explorer.tables.text_table import text_table
 from explorer.units import MISSING, fixed, signed
 from solver.photograph import Board, PhotographedPile, Refusal
 from solver.photograph.reading_error import COVERAGE, Angle
 
-Array = npt.NDArray[np.float64]
 MOST_POINTS = 400
 """Of a profile in plain data."""
 Rows = Sequence[tuple[str, str]]
@@ -33,7 +30,7 @@ def measure_text(measured: MeasuredPhotographs) -> str:
     """A table of the pictures, of the simulation below it, and what the numbers mean."""
     rows = [_row(pile) for pile in measured.piles]
     if measured.simulated is not None:
-        rows.append(_simulated_row(measured.simulated))
+        rows.append(_simulated_row(measured.simulated.summary))
     parts = []
     if rows:
         head = (
@@ -62,7 +59,7 @@ def measure_text(measured: MeasuredPhotographs) -> str:
     if measured.board is not None:
         parts.append(_board_words(measured.board))
     if len(measured.piles) > 1:
-        parts.append(_over_pictures(measured.piles))
+        parts.append(str(measured.over_pictures))
     if measured.simulated is not None:
         parts.append(_comparison(measured))
     return "\n\n".join(parts)
@@ -97,70 +94,70 @@ def thirds_words(thirds_deg: Sequence[float | None]) -> str:
     return " / ".join(MISSING if one is None or np.isnan(one) else fixed(one, 1) for one in thirds_deg)
 
 
-def measure_tables(result: Mapping[str, Any]) -> dict[str, Rows]:
-    """What :func:`measure_result` gave, for a place too narrow for one line a picture: picture → its rows."""
+def measure_tables(measured: MeasuredPhotographs, simulated: SimulatedViews | None = None) -> dict[str, Rows]:
+    """What was measured, for a place too narrow for one line a picture: picture → its rows.
+
+    ``simulated``: piles beside them that another process has read.
+    """
     tables: dict[str, Rows] = {}
-    board: Mapping[str, Any] | None = result.get("checkerboard")
-    for picture in result["pictures"]:
-        tables[picture["picture"]] = _pile_rows(picture, board) if picture["pile"] else _refusal_rows(picture)
-    if board is not None:
-        tables[f"checkerboard: {board['picture']}"] = _board_rows(board)
-    simulation = result["simulation"]
-    if simulation is not None:
-        means = [picture["angles"]["mean"]["value_deg"] for picture in result["pictures"] if picture["pile"]]
-        tables[f"simulated: {Path(simulation['source']).name}"] = _simulated_rows(simulation, means)
+    for reading in measured.readings:
+        tables[reading.name] = (
+            _pile_rows(reading, measured.board)
+            if isinstance(reading, PhotographedPile)
+            else (("no angle", f"{reading.reason}: {reading.detail}"),)
+        )
+    if measured.board is not None:
+        tables[f"checkerboard: {measured.board.name}"] = _board_rows(measured.board)
+    if simulated is not None:
+        means = [pile.angles.mean.value_deg for pile in measured.piles]
+        tables[f"simulated: {Path(simulated.source).name}"] = _simulated_rows(simulated, means)
     return tables
 
 
-def _board_rows(board: Mapping[str, Any]) -> Rows:
-    k, reach = board["lens_k"], COVERAGE * board["error"]
+def _board_rows(board: Board) -> Rows:
+    k, reach = board.bend.k, COVERAGE * board.bend.error
     kind = "no bend seen" if abs(k) <= reach else "barrel" if k < 0 else "pincushion"
     return (
         ("lens k", f"{signed(k, 4)} (95 % {signed(k - reach, 4)} … {signed(k + reach, 4)}): {kind}, taken out"),
         ("in the corners", f"seen {fixed(100 * abs(k), 1)} % too {'near' if k < 0 else 'far from'} the middle"),
-        ("corners", f"{board['corners']}; they miss a plane board by {fixed(board['miss_px'])} px (RMS)"),
+        ("corners", f"{board.corners}; they miss a plane board by {fixed(board.miss)} px (RMS)"),
     )
 
 
-def _pile_rows(picture: Mapping[str, Any], board: Mapping[str, Any] | None) -> Rows:
-    unit, base, rough = picture["length_unit"], picture["base_line"], picture["roughness"]
-    places = 2 if unit == "mm" else 1
-    angles = {name: angle_words(one["value_deg"], one["error_deg"]) for name, one in picture["angles"].items()}
-    roughness = float(np.sqrt(np.mean(np.square([rough["left"], rough["right"]]))))
+def _pile_rows(pile: PhotographedPile, board: Board | None) -> Rows:
+    factor, unit, places = _length_unit(pile)
+    angles = pile.angles
+    sides = (("left", angles.left), ("right", angles.right))
+    roughness = float(np.sqrt(np.mean(np.square(pile.roughness))))
     return (
-        ("angle of repose", angles["mean"]),
-        ("left flank", angles["left"]),
-        ("right flank", angles["right"]),
-        *(
-            (f"{side} by thirds", f"{thirds_words(picture['angles'][side]['thirds_deg'])}°")
-            for side in ("left", "right")
-        ),
-        ("height", f"{fixed(picture['height'], places)} {unit}"),
-        ("half-width", f"{fixed(picture['half_width'], places)} {unit}"),
-        ("roughness", f"{fixed(roughness, places)} {unit}"),
-        ("base line", f"{BASES[base['found_by']]}, tilted by {signed(base['tilt_deg'])}°"),
-        *([("lens", lens_words(picture["lens_k"]))] if picture["lens_k"] and board is None else []),
+        ("angle of repose", _angle_words(angles.mean)),
+        *((f"{side} flank", _angle_words(angle)) for side, angle in sides),
+        *((f"{side} by thirds", f"{thirds_words(angle.thirds_deg)}°") for side, angle in sides),
+        ("height", f"{fixed(factor * pile.height, places)} {unit}"),
+        ("half-width", f"{fixed(factor * pile.half_width, places)} {unit}"),
+        ("roughness", f"{fixed(factor * roughness, places)} {unit}"),
+        ("base line", f"{BASES[pile.base.kind]}, tilted by {signed(pile.base.tilt_deg)}°"),
+        *([("lens", lens_words(pile.lens))] if pile.lens and board is None else []),
     )
 
 
-def _refusal_rows(picture: Mapping[str, Any]) -> Rows:
-    return (("no angle", f"{picture['reason']}: {picture['detail']}"),)
+def _angle_words(angle: Angle) -> str:
+    return angle_words(angle.value_deg, angle.error_deg)
 
 
-def _simulated_rows(simulation: Mapping[str, Any], photographed_deg: Sequence[float]) -> Rows:
-    def row(name: str, key: str, unit: str) -> tuple[str, str]:
-        of = simulation[key]
-        spread = "" if of["sd"] is None else f" (standard deviation {fixed(of['sd'])}{unit})"
-        return name, f"{fixed(of['mean'])}{unit}{spread}"
+def _simulated_rows(simulated: SimulatedViews, photographed_deg: Sequence[float]) -> Rows:
+    def row(name: str, of: Spread, unit: str) -> tuple[str, str]:
+        spread = "" if np.isnan(of.sd) else f" (standard deviation {fixed(of.sd)}{unit})"
+        return name, f"{fixed(of.mean)}{unit}{spread}"
 
-    less = float(np.mean(photographed_deg)) - simulation["mean_deg"]["mean"] if photographed_deg else None
+    less = float(np.mean(photographed_deg)) - simulated.mean_deg.mean if photographed_deg else None
     return (
-        row("angle of repose", "mean_deg", "°"),
-        row("left flank", "left_deg", "°"),
-        row("right flank", "right_deg", "°"),
-        row("height", "height_mm", " mm"),
-        row("half-width", "half_width_mm", " mm"),
-        ("read on", f"{simulation['views']} views of {simulation['piles']} pile{'s' * (simulation['piles'] > 1)}"),
+        row("angle of repose", simulated.mean_deg, "°"),
+        row("left flank", simulated.left_deg, "°"),
+        row("right flank", simulated.right_deg, "°"),
+        row("height", simulated.height_mm, " mm"),
+        row("half-width", simulated.half_width_mm, " mm"),
+        ("read on", f"{simulated.views} views of {simulated.piles} pile{'s' * (simulated.piles > 1)}"),
         *([] if less is None else [("photographed less simulated", f"{signed(less)}°, both by the same fit")]),
     )
 
@@ -182,8 +179,8 @@ def measure_result(measured: MeasuredPhotographs) -> dict[str, Any]:
             _pile_result(reading) if isinstance(reading, PhotographedPile) else _refusal_result(reading)
             for reading in measured.readings
         ],
-        "over_pictures": _over_result(measured.piles),
-        "simulation": None if measured.simulated is None else _simulated_result(measured.simulated),
+        "over_pictures": measured.over_pictures.to_dict() if len(measured.piles) > 1 else None,
+        "simulation": None if measured.simulated is None else measured.simulated.summary.to_dict(),
         **({} if measured.board is None else {"checkerboard": _board_result(measured.board)}),
     }
 
@@ -199,17 +196,15 @@ def _board_result(board: Board) -> dict[str, Any]:
 
 
 def _row(pile: PhotographedPile) -> tuple[str, ...]:
-    shown, unit = _lengths(pile)
+    factor, unit, places = _length_unit(pile)
     angles = pile.angles
-    rough = shown(float(np.sqrt(np.mean(np.square(pile.roughness)))))
+    roughness = float(np.sqrt(np.mean(np.square(pile.roughness))))
     return (
         pile.name,
         angle_text(angles.left),
         angle_text(angles.right),
         angle_text(angles.mean),
-        shown(pile.height),
-        shown(pile.half_width),
-        rough,
+        *(f"{factor * length:.{places}f}" for length in (pile.height, pile.half_width, roughness)),
         unit,
         f"{pile.base.tilt_deg:+.2f}",
         BASES[pile.base.kind],
@@ -218,46 +213,25 @@ def _row(pile: PhotographedPile) -> tuple[str, ...]:
     )
 
 
-def _simulated_row(simulated: SimulatedPiles) -> tuple[str, ...]:
+def _simulated_row(simulated: SimulatedViews) -> tuple[str, ...]:
     return (
         f"simulated: {simulated.source}",
         _spread(simulated.left_deg),
         _spread(simulated.right_deg),
-        _spread(0.5 * (simulated.left_deg + simulated.right_deg)),
-        f"{1e3 * simulated.height.mean():.2f}",
-        f"{1e3 * simulated.half_width.mean():.2f}",
+        _spread(simulated.mean_deg),
+        f"{simulated.height_mm.mean:.2f}",
+        f"{simulated.half_width_mm.mean:.2f}",
         "-",
         "mm",
         "-",
-        f"mean and SD of {simulated.height.size} views of {simulated.piles} pile{'s' * (simulated.piles > 1)}",
+        f"mean and SD of {simulated.views} views of {simulated.piles} pile{'s' * (simulated.piles > 1)}",
         "-",
         "-",
     )
 
 
-def _spread(values: Array) -> str:
-    return f"{values.mean():.2f} (SD {values.std(ddof=1):.2f})" if values.size > 1 else f"{values.mean():.2f}"
-
-
-def _over_pictures(piles: Sequence[PhotographedPile]) -> str:
-    found = _over_result(piles)
-    assert found is not None
-    low, high = found["interval_deg"]
-    return (
-        f"{found['n']} pictures: mean {found['mean_deg']:.2f}°, SD {found['sd_deg']:.2f}°, "
-        f"95 % {low:.2f} … {high:.2f}° (Student's t over the pictures)"
-    )
-
-
-def _over_result(piles: Sequence[PhotographedPile]) -> dict[str, Any] | None:
-    """Mean angle over pictures, and the interval of that mean; None below two pictures."""
-    if len(piles) < 2:
-        return None
-    means = np.array([pile.angles.mean.value_deg for pile in piles])
-    sd = float(means.std(ddof=1))
-    reach = float(stats.t.ppf(0.975, means.size - 1)) * sd / np.sqrt(means.size)
-    mean = float(means.mean())
-    return {"n": means.size, "mean_deg": mean, "sd_deg": sd, "interval_deg": [mean - reach, mean + reach]}
+def _spread(of: Spread) -> str:
+    return f"{of.mean:.2f}" if np.isnan(of.sd) else f"{of.mean:.2f} (SD {of.sd:.2f})"
 
 
 def _comparison(measured: MeasuredPhotographs) -> str:
@@ -272,15 +246,13 @@ def _comparison(measured: MeasuredPhotographs) -> str:
     )
 
 
-def _lengths(pile: PhotographedPile) -> tuple[Any, str]:
-    """How a length is written, and its unit."""
-    return (
-        ((lambda length: f"{1e3 * length:.2f}"), "mm") if pile.unit == "m" else ((lambda length: f"{length:.1f}"), "px")
-    )
+def _length_unit(pile: PhotographedPile) -> tuple[float, str, int]:
+    """Its size, its name, and the decimal places of a length in it."""
+    return (1e3, "mm", 2) if pile.unit == "m" else (1.0, "px", 1)
 
 
 def _pile_result(pile: PhotographedPile) -> dict[str, Any]:
-    factor, unit = (1e3, "mm") if pile.unit == "m" else (1.0, "px")
+    factor, unit, _ = _length_unit(pile)
     angles = {name: getattr(pile.angles, name) for name in ("left", "right", "mean")}
     step = max(1, -(-pile.outline.u.size // MOST_POINTS))
     return {
@@ -319,22 +291,3 @@ def _pile_result(pile: PhotographedPile) -> dict[str, Any]:
 
 def _refusal_result(refusal: Refusal) -> dict[str, Any]:
     return {"picture": refusal.name, "pile": False, "reason": str(refusal.reason), "detail": refusal.detail}
-
-
-def _simulated_result(simulated: SimulatedPiles) -> dict[str, Any]:
-    views = {
-        "left_deg": simulated.left_deg,
-        "right_deg": simulated.right_deg,
-        "mean_deg": 0.5 * (simulated.left_deg + simulated.right_deg),
-        "height_mm": 1e3 * simulated.height,
-        "half_width_mm": 1e3 * simulated.half_width,
-    }
-    return {
-        "source": simulated.source,
-        "piles": simulated.piles,
-        "views": int(simulated.height.size),
-        **{
-            name: {"mean": float(of.mean()), "sd": float(of.std(ddof=1)) if of.size > 1 else None}
-            for name, of in views.items()
-        },
-    }

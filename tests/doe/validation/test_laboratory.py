@@ -16,7 +16,7 @@ from doe.measurement.features import SCALARS, SCAN, features_of_data, offer_of
 from doe.store import Store
 from doe.validation.campaign import Answers
 from doe.validation.laboratory import TREFOILS, read_laboratory
-from doe.validation.outside import AMPLITUDE, possible
+from doe.validation.outside import OUTSIDE_EFFECTS, possible_outside
 from doe.validation.scanner import Scanner
 from doe.validation.truth import REPLICATES, Case, Truth
 from doe.validation.work_place import WorkPlace
@@ -115,6 +115,6 @@ def test_scanners_are_drawn_from_the_file_s_ranges(tmp_path):
 
 def test_outside_effects_are_those_that_there_can_be():
     scene = read_laboratory(TREFOILS).declared.scene
-    assert possible(scene, tuple(AMPLITUDE)) == tuple(AMPLITUDE)
+    assert possible_outside(scene) == tuple(OUTSIDE_EFFECTS)
     cylinder = in_rig(scene, "lifting_cylinder")
-    assert set(AMPLITUDE) - set(possible(cylinder, tuple(AMPLITUDE))) == {"sticky_funnel", "draught", "raised_funnel"}
+    assert set(OUTSIDE_EFFECTS) - set(possible_outside(cylinder)) == {"sticky_funnel", "draught", "raised_funnel"}

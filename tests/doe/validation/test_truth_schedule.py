@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 
-from doe.validation.outside import AMPLITUDE
+from doe.validation.outside import OUTSIDE_EFFECTS
 from doe.validation.truth import STRENGTHS, WIDE_STRENGTHS, cases
 
 FULL = 370
@@ -14,12 +14,12 @@ def plain(case):
 
 
 def test_a_test_holds_what_the_targets_ask_for():
-    asked = list(cases(3, FULL, tuple(AMPLITUDE)))
+    asked = list(cases(3, FULL, tuple(OUTSIDE_EFFECTS)))
     kinds = Counter(case.kind for case in asked)
     assert kinds == {"null": 150, "effect": 120, "pair": 40, "outside": 60}
     assert Counter(case.strength for case in asked if case.kind == "effect") == dict.fromkeys(STRENGTHS, 60)
     outside = Counter(case.label for case in asked if case.kind == "outside")
-    assert set(outside) == set(AMPLITUDE)
+    assert set(outside) == set(OUTSIDE_EFFECTS)
     assert max(outside.values()) - min(outside.values()) <= 1
     assert all(6.0 <= case.strength <= 10.0 for case in asked if case.kind == "pair")
     assert [case.number for case in asked] == list(range(FULL))
@@ -27,13 +27,13 @@ def test_a_test_holds_what_the_targets_ask_for():
 
 
 def test_fewer_sets_are_the_first_of_more():
-    some, more = (list(map(plain, cases(3, n, tuple(AMPLITUDE)))) for n in (40, 150))
+    some, more = (list(map(plain, cases(3, n, tuple(OUTSIDE_EFFECTS)))) for n in (40, 150))
     assert more[:40] == some
     assert {kind for _, kind, _, _ in more} == {"null", "effect", "pair", "outside"}
 
 
 def test_another_root_asks_for_other_sets():
-    one, other = (list(map(plain, cases(root, 100, tuple(AMPLITUDE)))) for root in (3, 4))
+    one, other = (list(map(plain, cases(root, 100, tuple(OUTSIDE_EFFECTS)))) for root in (3, 4))
     assert one != other
     assert next(iter(cases(3, 1, ("a",)))).seed != next(iter(cases(4, 1, ("a",)))).seed
 
