@@ -9,17 +9,17 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from doe.declared.pours import Ended
 from explorer.background.progress import PourProgress, SimulatedTime
 from explorer.background.reporter import Reporter
 from explorer.errors import CommandError
 from explorer.files.checkpoint_writer import CheckpointWriter
-from explorer.files.run_folder import appearing, write_run
-from explorer.files.run_result import result_of
+from explorer.files.run_folder import appearing, write_result, write_run
+from explorer.files.run_result import BenchTestResult, SimulationResult, bench_test_result, simulation_result
 from explorer.scene.file import load_scene, with_settings
-from explorer.tables.pours import RunTable, bench_data, write_bench
+from explorer.tables.pours import RunTable
 from solver import Job, Record, Scene, check_scheduler, executor, run_pours
 from solver.arch import chosen
 from solver.pours.checkpoint import Checkpoint, read_checkpoint
@@ -101,20 +101,20 @@ def simulation_of(order: SimulateOrder, events: bool = False) -> Simulation:
     return found
 
 
-def run_bench(simulation: Simulation, out: Path | None) -> dict[str, Any]:
+def run_bench(simulation: Simulation, out: Path | None) -> BenchTestResult:
     """Make the bench test, into the new folder ``out`` where one is given; returns what it measured."""
     scene, (seed,) = simulation.scene, simulation.seeds
     with ExitStack() as stack:
         folder = stack.enter_context(appearing(out)) if out else None
-        data = bench_data(scene, run_bench_test(scene, seed))
+        result = bench_test_result(scene, run_bench_test(scene, seed))
         if folder:
-            write_bench(folder, data)
-    return data
+            write_result(folder, result)
+    return result
 
 
 def run_simulation(
     order: SimulateOrder, simulation: Simulation, reporter: Reporter, table: RunTable | None, say: Callable[[str], None]
-) -> dict[str, Any]:
+) -> SimulationResult:
     """Pour and write the files; returns the content of ``result.json``.
 
     ``table`` is told of every pour as it ends, ``say`` of what was recorded, also where the pours are cut off.
@@ -159,7 +159,7 @@ def run_simulation(
             if table:
                 table.add(finished)
         ordered = [records[k] for k in sorted(records)]
-        result = result_of(scene, ordered, perf_counter() - started)
+        result = simulation_result(scene, ordered, perf_counter() - started)
         if folder and order.out:
             write_run(folder, result, ordered)
             reporter.result = order.out / "result.json"

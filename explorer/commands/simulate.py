@@ -82,8 +82,8 @@ def simulate(
     )
     simulation = simulation_of(order, events)
     if simulation.is_bench_test:
-        data = run_bench(simulation, out)
-        typer.echo(json_text(data) if json else bench_text(data))
+        measured = run_bench(simulation, out)
+        typer.echo(json_text(measured.to_dict()) if json else bench_text(measured))
         return
     if large := large_pour_text(simulation.scene):
         typer.echo(large, err=True)
@@ -95,4 +95,4 @@ def simulate(
     if table:
         table.summarise(result)
     elif json:
-        typer.echo(json_text(result))
+        typer.echo(json_text(result.to_dict()))

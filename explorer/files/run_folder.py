@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from explorer.files.output_file import check_vacant
+from explorer.files.run_result import BenchTestResult, ParameterValue, SimulationResult
 from solver import Record
 
 TRACE_COLUMNS = {
@@ -68,10 +69,15 @@ def _umask() -> int:
     return mask
 
 
-def write_run(folder: Path, result: dict[str, Any], records: Sequence[Record]) -> None:
+def write_result(folder: Path, result: SimulationResult | BenchTestResult) -> None:
+    """Write ``result.json`` and ``parameters.toml`` into an existing ``folder``."""
+    (folder / "result.json").write_text(json_text(result.to_dict()) + "\n", encoding="utf-8")
+    (folder / "parameters.toml").write_text(parameters_text(result.parameters), encoding="utf-8")
+
+
+def write_run(folder: Path, result: SimulationResult, records: Sequence[Record]) -> None:
     """Write the files of a simulation into an existing ``folder``."""
-    (folder / "result.json").write_text(json_text(result) + "\n", encoding="utf-8")
-    (folder / "parameters.toml").write_text(parameters_text(result["parameters"]), encoding="utf-8")
+    write_result(folder, result)
     for record in records:
         _write_trace(folder / f"trace_{record.seed}.csv", record)
         spheres = record.pile.spheres
@@ -93,10 +99,10 @@ def json_text(result: dict[str, Any]) -> str:
     return json.dumps(result, indent=2, ensure_ascii=False, allow_nan=False)
 
 
-def parameters_text(values: dict[str, dict[str, Any]]) -> str:
+def parameters_text(values: dict[str, ParameterValue]) -> str:
     """TOML of parameters: path → value, its SI unit as a comment."""
     lines = ["# Every parameter of the run; SI."]
     for path, entry in values.items():
-        unit = "" if entry["unit"] == "1" else f"   # [{entry['unit']}]"
-        lines.append(f"{json.dumps(path)} = {json.dumps(entry['value'])}{unit}")
+        unit = "" if entry.unit == "1" else f"   # [{entry.unit}]"
+        lines.append(f"{json.dumps(path)} = {json.dumps(entry.value)}{unit}")
     return "\n".join(lines) + "\n"

@@ -1,15 +1,6 @@
-"""The result of replicated pours as plain data: what ``simulate --json`` prints and ``result.json`` holds.
+"""The results of ``explorer simulate`` as records: what ``--json`` prints and ``result.json`` holds.
 
-    outcome, message, seed, dt, steps    of the first seed
-    observables     name → value and spread (within the pile) of the first seed, unit, and mean, sd, n over
-                    the valid replicates (at rest, or measured) in which it could be measured
-    outcomes        outcome → number of replicates
-    runs            per seed: outcome, message, dt, steps, wall_s, energy, and name → value and spread;
-                    energy: put in and dissipated [J], and the account's largest error as a fraction of what was put in
-    parameters      path → value in SI, unit
-    seeds, wall_s (of all), title, versions
-
-A number that could not be measured is null.
+SI units. A number that could not be measured is NaN, and null in a file.
 """
 
 from __future__ import annotations
@@ -19,42 +10,197 @@ import math
 import platform
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib import metadata
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+import doe.record
 from doe.provenance import About
 from solver import PHYSICS, Record, Scene, Trace, parameters, value
 from solver.observables import Value, observe
 
+if TYPE_CHECKING:
+    from solver.single_body import BenchResult
+
 RUNTIME = ("taichi", "numpy")
 
 
-def result_of(scene: Scene, records: Sequence[Record], wall_s: float) -> dict[str, Any]:
+@dataclass(frozen=True)
+class ParameterValue(doe.record.Record):
+    """A parameter of a scene in SI, or the name of a choice."""
+
+    value: float | str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Observed(doe.record.Record):
+    """What was read off one pile; ``spread``: within it."""
+
+    value: float
+    spread: float
+
+
+@dataclass(frozen=True)
+class ObservedOverRuns(doe.record.Record):
+    """An observable of the first run, and over the ``n`` valid ones in which it could be measured."""
+
+    value: float
+    spread: float
+    unit: str
+    mean: float
+    sd: float
+    n: int
+
+
+@dataclass(frozen=True)
+class EnergyAccount(doe.record.Record):
+    """Energy put in and dissipated, and the account's largest error as a fraction of what was put in."""
+
+    put_in_J: float
+    dissipated_J: float
+    largest_error: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class PourResult(doe.record.Record):
+    """One pour."""
+
+    seed: int
+    outcome: str
+    message: str
+    dt: float
+    steps: int
+    wall_s: float
+    energy: EnergyAccount
+    observables: dict[str, Observed]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulationResult(doe.record.Record):
+    """Replicated pours of one scene.
+
+    Attributes
+    ----------
+    outcome, message, seed, dt, steps
+        Of the first seed.
+    outcomes
+        Outcome → number of replicates.
+    observables
+        By name.
+    parameters
+        By path.
+    runs
+        In the order of ``seeds``.
+    wall_s
+        Of all.
+    """
+
+    title: str
+    outcome: str
+    message: str
+    outcomes: dict[str, int]
+    observables: dict[str, ObservedOverRuns]
+    parameters: dict[str, ParameterValue]
+    seed: int
+    seeds: tuple[int, ...]
+    dt: float
+    steps: int
+    wall_s: float
+    runs: tuple[PourResult, ...]
+    versions: dict[str, str | None]
+
+
+@dataclass(frozen=True)
+class BenchQuantity(doe.record.Record):
+    """A measured number; ``reference``: what was put in, ``error``: value/reference − 1."""
+
+    value: float
+    reference: float
+    error: float
+    spread: float
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchTestResult(doe.record.Record):
+    """A bench test of one ``body`` on a ``wall``.
+
+    Attributes
+    ----------
+    quantities
+        By name.
+    series
+        Name with unit → values: curves, all of one length.
+    table
+        The same of a study beside the test; empty where there is none.
+    parameters
+        By path.
+    """
+
+    title: str
+    test: str
+    body: str
+    wall: str
+    note: str
+    quantities: dict[str, BenchQuantity]
+    series: dict[str, tuple[float, ...]]
+    table: dict[str, tuple[float, ...]]
+    parameters: dict[str, ParameterValue]
+    versions: dict[str, str | None]
+
+
+def simulation_result(scene: Scene, records: Sequence[Record], wall_s: float) -> SimulationResult:
     """All about the ``records`` of one scene, in the order of their seeds; ``wall_s`` [s] for all of them."""
     observed = [observe(record) for record in records]
     first = records[0]
-    return {
-        "title": scene.title,
-        "outcome": str(first.outcome),
-        "message": first.message,
-        "outcomes": dict(Counter(str(record.outcome) for record in records)),
-        "observables": _observables(records, observed),
-        "parameters": parameter_values(scene),
-        "seed": first.seed,
-        "seeds": [record.seed for record in records],
-        "dt": first.dt,
-        "steps": first.steps,
-        "wall_s": wall_s,
-        "runs": [_run(record, values) for record, values in zip(records, observed, strict=True)],
-        "versions": versions(),
-    }
+    return SimulationResult(
+        title=scene.title,
+        outcome=str(first.outcome),
+        message=first.message,
+        outcomes=dict(Counter(str(record.outcome) for record in records)),
+        observables=_observables(records, observed),
+        parameters=parameter_values(scene),
+        seed=first.seed,
+        seeds=tuple(record.seed for record in records),
+        dt=first.dt,
+        steps=first.steps,
+        wall_s=wall_s,
+        runs=tuple(_run(record, values) for record, values in zip(records, observed, strict=True)),
+        versions=versions(),
+    )
 
 
-def parameter_values(scene: Scene) -> dict[str, dict[str, Any]]:
-    """Every parameter of ``scene``: path → value in SI (or the name of a choice), unit."""
-    return {path: {"value": value(scene, path), "unit": entry.unit} for path, entry in parameters(scene).items()}
+def bench_test_result(scene: Scene, result: BenchResult) -> BenchTestResult:
+    """All about one bench test."""
+    return BenchTestResult(
+        title=scene.title,
+        test=result.test,
+        body=result.body,
+        wall=result.wall,
+        note=result.note,
+        quantities={
+            quantity.name: BenchQuantity(
+                quantity.value,
+                _or_nan(quantity.reference),
+                _or_nan(quantity.error),
+                _or_nan(quantity.spread),
+                quantity.unit,
+            )
+            for quantity in result.quantities
+        },
+        series=dict(result.series),
+        table=dict(result.table),
+        parameters=parameter_values(scene),
+        versions=versions(),
+    )
+
+
+def parameter_values(scene: Scene) -> dict[str, ParameterValue]:
+    """Every parameter of ``scene``, by path."""
+    return {path: ParameterValue(value(scene, path), entry.unit) for path, entry in parameters(scene).items()}
 
 
 def versions() -> dict[str, str | None]:
@@ -80,47 +226,37 @@ def package_version(distribution: str) -> str | None:
         return None
 
 
-def _observables(records: Sequence[Record], observed: Sequence[dict[str, Value]]) -> dict[str, dict[str, Any]]:
+def _observables(records: Sequence[Record], observed: Sequence[dict[str, Value]]) -> dict[str, ObservedOverRuns]:
     valid = [values for record, values in zip(records, observed, strict=True) if record.outcome.valid]
-    return {
-        name: _value(first) | {"unit": first.unit} | _over_replicates([values[name].value for values in valid])
-        for name, first in observed[0].items()
-    }
+    found = {}
+    for name, first in observed[0].items():
+        finite = [number for values in valid if math.isfinite(number := values[name].value)]
+        mean = float(np.mean(finite)) if finite else math.nan
+        sd = float(np.std(finite, ddof=1)) if len(finite) > 1 else math.nan
+        found[name] = ObservedOverRuns(first.value, _or_nan(first.spread), first.unit, mean, sd, len(finite))
+    return found
 
 
-def _over_replicates(numbers: Sequence[float]) -> dict[str, Any]:
-    finite = [number for number in numbers if math.isfinite(number)]
-    return {
-        "mean": float(np.mean(finite)) if finite else None,
-        "sd": float(np.std(finite, ddof=1)) if len(finite) > 1 else None,
-        "n": len(finite),
-    }
+def _run(record: Record, values: dict[str, Value]) -> PourResult:
+    return PourResult(
+        seed=record.seed,
+        outcome=str(record.outcome),
+        message=record.message,
+        dt=record.dt,
+        steps=record.steps,
+        wall_s=record.wall_s,
+        energy=_energy(record.trace),
+        observables={name: Observed(one.value, _or_nan(one.spread)) for name, one in values.items()},
+    )
 
 
-def _run(record: Record, values: dict[str, Value]) -> dict[str, Any]:
-    return {
-        "seed": record.seed,
-        "outcome": str(record.outcome),
-        "message": record.message,
-        "dt": record.dt,
-        "steps": record.steps,
-        "wall_s": record.wall_s,
-        "energy": _energy(record.trace),
-        "observables": {name: _value(observed) for name, observed in values.items()},
-    }
-
-
-def _energy(trace: Trace) -> dict[str, float | None]:
+def _energy(trace: Trace) -> EnergyAccount:
     put_in = trace.supplied_energy + trace.wall_work
-    return {
-        "put_in_J": finite_or_none(put_in[-1]),
-        "dissipated_J": finite_or_none(trace.dissipated_energy[-1]),
-        "largest_error": finite_or_none(np.abs(trace.energy_error).max()),
-    }
+    return EnergyAccount(float(put_in[-1]), float(trace.dissipated_energy[-1]), float(np.abs(trace.energy_error).max()))
 
 
-def _value(observed: Value) -> dict[str, float | None]:
-    return {"value": finite_or_none(observed.value), "spread": finite_or_none(observed.spread)}
+def _or_nan(number: float | None) -> float:
+    return math.nan if number is None else number
 
 
 def finite_or_none(number: float | None) -> float | None:

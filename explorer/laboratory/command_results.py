@@ -33,7 +33,7 @@ from explorer.design.factors_file import read_factors
 from explorer.design.run_plan import DesignOrder, make_plan, sheet_content
 from explorer.design.text import analysis_text, check_power, plan_text
 from explorer.files.run_folder import json_text
-from explorer.files.run_result import made_today
+from explorer.files.run_result import BenchTestResult, made_today
 from explorer.laboratory.part import part_table
 from explorer.laboratory.run import LabOrder, analysed, files_of, part_file
 from explorer.measured.folder import NewCondition, write_condition, written_text
@@ -158,10 +158,11 @@ def rig_result(scene: Scene, rig: str, values: Mapping[str, float | str], seed: 
     """
     source = rig_source(rig, str(kept_scene(scene, folder)))
     line = command_line(source, with_values(source.scene, dict(values)), seed)
-    data: dict[str, Any] = json.loads(command_output([*shlex.split(line)[1:], "--json"]))
-    plots: Plots = {title: Plot(partial(dict, spec), ON_THE_SOLVER) for title, spec in bench_charts(data).items()}
-    files = {f"{rig}.json": f"{json_text(data)}\n".encode()}
-    return CommandResult(bench_text(data), line, plots, files)
+    printed = command_output([*shlex.split(line)[1:], "--json"])
+    result = BenchTestResult.from_dict(json.loads(printed))
+    plots: Plots = {title: Plot(partial(dict, spec), ON_THE_SOLVER) for title, spec in bench_charts(result).items()}
+    files = {f"{rig}.json": f"{json_text(result.to_dict())}\n".encode()}
+    return CommandResult(bench_text(result), line, plots, files)
 
 
 def photograph_reading(

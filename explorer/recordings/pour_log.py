@@ -271,9 +271,8 @@ def parameters_document(scene: Scene, seed: int) -> str:
         "|-|-|-|",
     ]
     for path, entry in parameter_values(scene).items():
-        number = entry["value"]
-        shown = number if isinstance(number, str) else f"{number:.6g}"
-        lines.append(f"| {path} | {shown} | {entry['unit']} |")
+        shown = entry.value if isinstance(entry.value, str) else f"{entry.value:.6g}"
+        lines.append(f"| {path} | {shown} | {entry.unit} |")
     return "\n".join(lines)
 
 

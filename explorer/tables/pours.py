@@ -1,27 +1,17 @@
-"""What ``explorer simulate`` prints: a line per pour as it finishes, then the means; of a bench test, its quantities.
-
-A bench test is kept as plain data: ``test``, ``body``, ``wall``, ``note``; ``quantities`` name → value, reference (what
-was put in), error (value/reference − 1), spread, unit; ``series`` and ``table`` name → list of numbers; ``parameters``
-path → value in SI, unit; ``versions``. A number that could not be measured is null.
-"""
+"""What ``explorer simulate`` prints: a line per pour as it ends, then the means; of a bench test, its quantities."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from explorer.files.run_folder import json_text, parameters_text
-from explorer.files.run_result import finite_or_none, parameter_values, versions
+from explorer.files.run_result import BenchTestResult, EnergyAccount, SimulationResult
 from explorer.tables.text_table import table_line, text_table
-from solver import Record, Scene
+from solver import Record
 from solver.observables import Value, observable_names, observe
-
-if TYPE_CHECKING:
-    from solver.single_body import BenchResult
 
 COLUMNS = {
     "seed": -6,
@@ -70,26 +60,25 @@ class RunTable:
         if record.message:
             self._echo(f"        {record.message}")
 
-    def summarise(self, result: dict[str, Any]) -> None:
+    def summarise(self, result: SimulationResult) -> None:
         """Print the observables: of the pile, or of several replicates the means over those that are valid."""
-        several = len(result["seeds"]) > 1
+        several = len(result.seeds) > 1
         keys = ("mean", "sd", "n") if several else ("value", "spread")
         rows = [
-            (name, *(_number(entry[key], ".5g") for key in keys), entry["unit"])
-            for name, entry in result["observables"].items()
+            (name, *(_number(getattr(entry, key), ".5g") for key in keys), entry.unit)
+            for name, entry in result.observables.items()
         ]
         self._echo("")
         self._echo(text_table(("observable", *keys, "unit"), rows))
         if several:
-            counted = ", ".join(f"{count} {outcome}" for outcome, count in result["outcomes"].items())
-            self._echo(f"\n{len(result['seeds'])} pours: {counted}; means over those that are valid")
-        self._echo(f"\n{energy_line([run['energy'] for run in result['runs']])}")
+            counted = ", ".join(f"{count} {outcome}" for outcome, count in result.outcomes.items())
+            self._echo(f"\n{len(result.seeds)} pours: {counted}; means over those that are valid")
+        self._echo(f"\n{energy_line([run.energy for run in result.runs])}")
 
 
-def energy_line(accounts: Sequence[dict[str, float | None]]) -> str:
+def energy_line(accounts: Sequence[EnergyAccount]) -> str:
     """Energy put in (mean), the share of it that was dissipated, and how far the worst account is off."""
-    keys = ("put_in_J", "dissipated_J", "largest_error")
-    put_in, dissipated, error = np.array([[account[key] for key in keys] for account in accounts], dtype=float).T
+    put_in, dissipated, error = np.array([dataclasses.astuple(account) for account in accounts]).T
     return (
         f"energy put in: {_number(1e3 * put_in.mean(), '.4g')} mJ, "
         f"dissipated: {_number(100.0 * dissipated.sum() / put_in.sum(), '.4g')} %; "
@@ -97,62 +86,24 @@ def energy_line(accounts: Sequence[dict[str, float | None]]) -> str:
     )
 
 
-def bench_data(scene: Scene, result: BenchResult) -> dict[str, Any]:
-    """All about one bench test as plain data."""
-    return {
-        "title": scene.title,
-        "test": result.test,
-        "body": result.body,
-        "wall": result.wall,
-        "note": result.note,
-        "quantities": {
-            quantity.name: {
-                "value": finite_or_none(quantity.value),
-                "reference": finite_or_none(quantity.reference),
-                "error": finite_or_none(quantity.error),
-                "spread": finite_or_none(quantity.spread),
-                "unit": quantity.unit,
-            }
-            for quantity in result.quantities
-        },
-        "series": {name: [finite_or_none(number) for number in numbers] for name, numbers in result.series},
-        "table": {name: [finite_or_none(number) for number in numbers] for name, numbers in result.table},
-        "parameters": parameter_values(scene),
-        "versions": versions(),
-    }
-
-
-def bench_text(data: dict[str, Any]) -> str:
-    """The same for people: quantities, then the table where there is one."""
+def bench_text(result: BenchTestResult) -> str:
+    """The quantities of a bench test, then the table where there is one."""
     rows = [
-        (
-            name,
-            _number(entry["value"], ".5g"),
-            _number(entry["reference"], ".5g"),
-            _percent(entry["error"]),
-            entry["unit"],
-        )
-        for name, entry in data["quantities"].items()
+        (name, _number(one.value, ".5g"), _number(one.reference, ".5g"), _percent(one.error), one.unit)
+        for name, one in result.quantities.items()
     ]
     parts = [
-        f"{data['test']}: {data['body']} on {data['wall']}",
+        f"{result.test}: {result.body} on {result.wall}",
         text_table(("quantity", "measured", "put in", "error %", "unit"), rows),
     ]
-    if data["table"]:
-        columns = data["table"]
-        lines = [tuple(_number(number, ".5g") for number in row) for row in zip(*columns.values(), strict=True)]
-        parts.append(text_table(tuple(columns), lines))
-    return "\n\n".join([*parts, data["note"]] if data["note"] else parts)
+    if result.table:
+        lines = [tuple(_number(number, ".5g") for number in row) for row in zip(*result.table.values(), strict=True)]
+        parts.append(text_table(tuple(result.table), lines))
+    return "\n\n".join([*parts, result.note] if result.note else parts)
 
 
-def _percent(error: float | None) -> str:
-    return "-" if error is None else f"{100.0 * error:+.3f}"
-
-
-def write_bench(folder: Path, data: dict[str, Any]) -> None:
-    """Write ``result.json`` and ``parameters.toml`` into an existing ``folder``."""
-    (folder / "result.json").write_text(json_text(data) + "\n", encoding="utf-8")
-    (folder / "parameters.toml").write_text(parameters_text(data["parameters"]), encoding="utf-8")
+def _percent(error: float) -> str:
+    return "-" if math.isnan(error) else f"{100.0 * error:+.3f}"
 
 
 def _number(number: float | None, form: str) -> str:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from doe.laboratory.linear_range import LinearRange
 from doe.laboratory.result import CONDITIONS
 from doe.laboratory.sieve import rosin_rammler, undersize
 from doe.laboratory.tables import Reading, by_replicate
+from explorer.files.run_result import BenchTestResult
 from explorer.report.content import Spec
 from explorer.report.figures.style import (
     ASSUMPTION,
@@ -27,6 +27,7 @@ from explorer.report.figures.style import (
     axis,
     chart,
     error_bars,
+    finite,
     label,
     line,
     points,
@@ -216,21 +217,21 @@ def interval(one: Derived) -> tuple[float, float]:
     return one.summary.mean, 0.5 * (found.high - found.low)
 
 
-def bench_charts(data: dict[str, Any]) -> dict[str, Spec]:
-    """Title → chart, from what `explorer.tables.pours.bench_data` gives."""
-    columns = list(data["series"].items())
+def bench_charts(result: BenchTestResult) -> dict[str, Spec]:
+    """Title → chart of every column over the first."""
+    columns = list(result.series.items())
     if not columns or len(columns[0][1]) < LEAST_POINTS:
         return {}
     (name, across), *others = columns
     return {f"{other} over {name}": _curve(name, across, other, values) for other, values in others}
 
 
-def _curve(name: str, across: list[float | None], other: str, values: list[float | None]) -> Spec:
+def _curve(name: str, across: Sequence[float], other: str, values: Sequence[float]) -> Spec:
     trace = {
         "type": "scatter",
         "mode": "lines+markers",
-        "x": across,
-        "y": values,
+        "x": finite(across),
+        "y": finite(values),
         "name": label(other),
         "line": {"color": FACTOR, "width": 2},
         "marker": {"size": 4},

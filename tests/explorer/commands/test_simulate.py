@@ -8,7 +8,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from explorer.files.run_result import result_of
+from explorer.files.run_result import simulation_result
 from explorer.recordings.recording import FRAME_INTERVAL
 from explorer.recordings.recording_reader import read_recording
 from explorer.scene.file import load_scene, with_settings
@@ -96,14 +96,14 @@ def test_means_are_over_the_replicates_at_rest(record, monkeypatch):
     )
     outcomes = {seed: Outcome.JAMMED if seed == 2 else Outcome.AT_REST for seed in angles}
     records = [dataclasses.replace(record, seed=seed, outcome=outcomes[seed]) for seed in angles]
-    result = result_of(record.scene, records, wall_s=1.0)
-    entry = result["observables"]["angle"]
+    result = simulation_result(record.scene, records, wall_s=1.0)
+    entry = result.observables["angle"]
     # by hand: mean of 10, 30, 40 is 80/3; sum of squares 1400/3, over n - 1 = 2
-    assert entry["mean"] == pytest.approx(80.0 / 3.0, rel=1e-12)
-    assert entry["sd"] == pytest.approx((700.0 / 3.0) ** 0.5, rel=1e-12)
-    assert (entry["n"], entry["value"], entry["spread"], entry["unit"]) == (3, 10.0, 1.5, "deg")
-    assert result["outcomes"] == {"at_rest": 4, "jammed": 1}
-    assert result["runs"][4]["observables"]["angle"] == {"value": None, "spread": 1.5}
+    assert entry.mean == pytest.approx(80.0 / 3.0, rel=1e-12)
+    assert entry.sd == pytest.approx((700.0 / 3.0) ** 0.5, rel=1e-12)
+    assert (entry.n, entry.value, entry.spread, entry.unit) == (3, 10.0, 1.5, "deg")
+    assert result.outcomes == {"at_rest": 4, "jammed": 1}
+    assert result.to_dict()["runs"][4]["observables"]["angle"] == {"value": None, "spread": 1.5}
 
 
 def test_table_for_people(record, monkeypatch):

@@ -73,6 +73,7 @@ def test_a_rig_that_cannot_be_is_refused_before_anything_runs(tmp_path, monkeypa
 
 def test_curves_of_a_rig_become_charts(tmp_path, monkeypatch):
     data = {
+        "title": "",
         "test": "compression",
         "body": "sphere of seed",
         "wall": "steel",
@@ -80,6 +81,8 @@ def test_curves_of_a_rig_become_charts(tmp_path, monkeypatch):
         "quantities": {},
         "series": {"approach_m": [0.0, 1e-6, 2e-6], "force_N": [0.0, 1.0, None], "modulus_Pa": [None, 1.0, 2.0]},
         "table": {},
+        "parameters": {},
+        "versions": {},
     }
     monkeypatch.setattr("explorer.laboratory.command_results.command_output", lambda words: json.dumps(data))
     answer = rig_result(MATERIAL, "compression", {}, 1, tmp_path)
