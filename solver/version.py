@@ -2,6 +2,7 @@
 
 PHYSICS = 2
 """Raise it with every change to the bits of any pour, and never otherwise: it is part of every stored pour's key.
+A change that only pours with one effect see raises that effect's ``revision`` instead, and theirs alone are anew.
 
 The golden bits are those of short pours of every contact law, effect, rig, shape and batch size. Their test fails
 where bits change under the same number, and where the number is raised while every bit stays as it was. After raising

@@ -5,10 +5,10 @@
     a = exp(2.3288 − 6.4581 φ + 2.4486 φ²)                 b = 0.0964 + 0.5565 φ
     c = exp(4.905 − 13.8944 φ + 18.4222 φ² − 10.2599 φ³)   d = exp(1.4681 + 12.2584 φ − 20.7322 φ² + 15.8855 φ³)
 
-D is the diameter of the sphere of the same volume, φ the sphericity, A the area that the body shows to the wind:
-that of the ellipsoid with its outer dimensions, π √((bc u₁)² + (ac u₂)² + (ab u₃)²) for a wind along u. The formula
-of C_D holds for isometric bodies, φ > 0.2, Re < 2.6·10⁵; no lift, no torque, no wake of
-others. The strength s scales the force, 1 is air; vanishes for s → 0.
+D is the diameter of the sphere of the same volume, φ the sphericity. C_D is by that sphere's area, so A is ¼ π D² on
+average over all directions of the wind, and goes with the area that the ellipsoid of the body's outer dimensions
+shows: φ π √((bc u₁)² + (ac u₂)² + (ab u₃)²) for a wind along u. The formula of C_D holds for isometric bodies, φ > 0.2,
+Re < 2.6·10⁵; no lift, no torque, no wake of others. The strength s scales the force, 1 is air; vanishes for s → 0.
 Source: Haider & Levenspiel 1989, Powder Technology 58:63.
 """
 
@@ -76,4 +76,5 @@ class AirDrag(BodyEffect):
     literature = "1 is air; the coefficient of odd shapes is known within a factor of two"
     lever = "drop height; a fan; the time a single body falls"
     telltales = (Telltale.FLOW,)
+    revision = 2
     act = staticmethod(drag)

@@ -62,6 +62,9 @@ class Effect:
     """The experiment that reveals it."""
     telltales: ClassVar[tuple[Telltale, ...]]
     """Observables that can reveal it; it stays hidden in data that hold none of them."""
+    revision: ClassVar[int] = 1
+    """Raise it, and not ``solver.version.PHYSICS``, with a change to the bits of pours in which it acts and no others:
+    it is part of such a pour's key."""
     on_bench: ClassVar[bool] = False
     """Whether it stays with the bench where the rig is turned by 180° on it: its amplitudes change their sign then."""
 

@@ -57,20 +57,22 @@ def root(k, reduced_radius, overlap, before):
 def adhere(w, c):
     """Let contact ``c`` be adhesive with the work of adhesion ``w`` [J/m²], in addition to what it has already.
 
-    In terms of x = √a the force is E* x³ (4 x³/(3 R*) − 2 k).
+    In terms of x = √a the force is E* x³ (4 x³/(3 R*) − 2 k). Surfaces that a bridge holds at a gap do not touch.
     """
     c.work += w
     k = ti.sqrt(2.0 * math.pi * c.work / c.e_star)
-    if pulls(k, c.reduced_radius, c.overlap):
+    if (c.overlap > 0.0 or c.before > 0.0) and pulls(k, c.reduced_radius, c.overlap):
         x = root(k, c.reduced_radius, c.overlap, c.before)
         cube = x * x * x
-        force = c.e_star * cube * (4.0 / 3.0 * cube / c.reduced_radius - 2.0 * k)
+        force = c.part * (c.e_star * cube * (4.0 / 3.0 * cube / c.reduced_radius - 2.0 * k))
         # What earlier stages have made of the Hertzian force stays beside the adhesive one.
         c.elastic += force - c.adhesive
         c.adhesive = force
-        pull_off = 1.5 * math.pi * w * c.reduced_radius
-        c.pull += 2.0 * pull_off
-        c.floor -= pull_off
+        pull_off = c.part * (1.5 * math.pi * c.work * c.reduced_radius)
+        more = pull_off - c.pull_off
+        c.pull += 2.0 * more
+        c.floor -= more
+        c.pull_off = pull_off
         c.radius = x * x
         c.held = 1
     return c

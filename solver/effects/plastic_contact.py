@@ -23,11 +23,13 @@ from solver.params import param
 @kernel_function
 def unload_stiffer(p, m, c):
     """p: λ; m: δ_max."""
+    if c.before == 0.0:
+        m[0] = 0.0
     if c.overlap > 0.0:
         m[0] = ti.max(m[0], c.overlap)
         hertz = 4.0 / 3.0 * c.e_star * c.radius * c.overlap
         past = 4.0 / 3.0 * c.e_star * ti.sqrt(c.reduced_radius * m[0]) * m[0]
-        c.elastic += ti.max(0.0, (hertz - p[0] * past) / (1.0 - p[0])) - hertz
+        c.elastic += c.part * (ti.max(0.0, (hertz - p[0] * past) / (1.0 - p[0])) - hertz)
     return c, m
 
 
@@ -43,6 +45,7 @@ class PlasticContact(ContactEffect):
     literature = "λ = 0.2–0.8 for food and soft plant material in EEPA calibrations"
     lever = "drop test at several heights: a rebound lower than the damping explains, and alike at every speed"
     telltales = (Telltale.SHAPE,)
+    revision = 2
     stage = Stage.NORMAL
     act = staticmethod(unload_stiffer)
     memory = 1

@@ -9,11 +9,12 @@ Touch = ti.types.struct(
     overlap=ti.f64,  # [m]; negative while a pull holds surfaces that are apart
     reduced_radius=ti.f64,  # R* [m]
     mass=ti.f64,  # m* [kg]
+    part=ti.f64,  # of the pair's stiffness that is this contact's; 1 where contacts do not share
     v_n=ti.f64,  # relative velocity along the normal [m/s], positive while separating
     v_t=Vec3,  # and across it [m/s]
     omega=Vec3,  # relative angular velocity ω_i − ω_j [rad/s]
     dt=ti.f64,  # [s]
-    before=ti.f64,  # contact radius a at the last step [m]; 0: the first step of this contact
+    before=ti.f64,  # contact radius a at the last step [m]; 0: the first step of this touch
     # Constants of the pair
     e_star=ti.f64,  # E* [Pa]
     g_star=ti.f64,  # G* [Pa]
@@ -24,6 +25,7 @@ Touch = ti.types.struct(
     elastic=ti.f64,  # NORMAL, ADHESION: force without damping [N], tensile where negative
     adhesive=ti.f64,  # the part of it that JKR sets: Hertz's force, with adhesion JKR's [N]
     work=ti.f64,  # ADHESION: work of adhesion so far [J/m²]; those of several effects add up
+    pull_off=ti.f64,  # ADHESION: JKR's pull-off force in ``floor`` and ``pull`` so far [N]
     damper=ti.f64,  # NORMAL: damping force over speed [kg/s]
     shear_damper=ti.f64,  # of the tangential direction while it sticks [kg/s]
     floor=ti.f64,  # ADHESION: the normal force never falls below this [N], ≤ 0
@@ -39,7 +41,7 @@ the G* with which it is."""
 Flight = ti.types.struct(
     velocity=Vec3,  # [m/s]
     rotation=ti.types.matrix(3, 3, ti.f64),  # principal frame → world
-    semi_axes=Vec3,  # half the outer dimensions along the principal axes [m]
+    semi_axes=Vec3,  # of the ellipsoid that stands for the body in the wind [m], `engine/tables.py`
     diameter=ti.f64,  # of the sphere of the same volume [m]
     drag_factors=Vec4,  # a, b, c, d of its drag coefficient (`air_drag.py`)
 )

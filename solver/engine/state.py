@@ -66,7 +66,7 @@ BODY = {
     "force": Vec3,  # contact force [N]
     "torque": Vec3,  # contact torque about the centre of mass, world frame [N m]
     "reach": ti.f64,  # radius of the bounding sphere [m]
-    "semi_axes": Vec3,  # half the outer dimensions along the principal axes [m]
+    "semi_axes": Vec3,  # of the ellipsoid that stands for the body in the wind [m], `tables.outline`
     "diameter": ti.f64,  # of the sphere of the same volume [m]
     "drag_factors": Vec4,  # a, b, c, d of its drag coefficient (`effects/air_drag.py`)
     "swing": ti.f64,  # largest distance of a member's centre from the centre of mass [m]

@@ -46,7 +46,7 @@ class BodyTables:
     """Bodies of one world in order of entry, as the arrays want them (n bodies, m member spheres)."""
 
     numbers: Array
-    """mass, inertia (3), reach, semi-axes (3), diameter at equal volume, sphericity; shape (n, 10)."""
+    """mass, inertia (3), reach, and what :func:`outline` gives (5); shape (n, 10)."""
     places: Ints
     """first member, number of members, contact class; shape (n, 3)."""
     spheres: Array
@@ -132,16 +132,19 @@ def body_tables(scene: Scene, order: Ints, scale: Array | None = None) -> BodyTa
 
 
 def outline(body: Body) -> tuple[float, ...]:
-    """What the air meets: semi-axes (3) [m], diameter of the sphere of the same volume [m], sphericity.
+    """What the air meets: semi-axes (3) [m], diameter of the sphere of the same volume [m], sphericity φ.
 
     The surface is that of the ellipsoid with the body's outer dimensions, within 1.1 % (K. Thomsen 2004):
-    4π (((ab)ᵖ + (ac)ᵖ + (bc)ᵖ)/3)^(1/p), p = 1.6075.
+    4π (((ab)ᵖ + (ac)ᵖ + (bc)ᵖ)/3)^(1/p), p = 1.6075. A convex body shows a quarter of its surface on average
+    (Cauchy), 1/φ times what the sphere of its volume shows; semi-axes are √φ times the body's own, for the same mean.
     """
     a, b, c = (extent / 2.0 for extent in body.extents)
     diameter = (6.0 * body.mass / (math.pi * body.density)) ** (1.0 / 3.0)
     p = 1.6075
     surface = 4.0 * math.pi * (((a * b) ** p + (a * c) ** p + (b * c) ** p) / 3.0) ** (1.0 / p)
-    return a, b, c, diameter, min(1.0, math.pi * diameter**2 / surface)
+    sphericity = min(1.0, math.pi * diameter**2 / surface)
+    shown = math.sqrt(sphericity)
+    return shown * a, shown * b, shown * c, diameter, sphericity
 
 
 @lru_cache(maxsize=32)

@@ -18,6 +18,7 @@ from typing import Any
 
 from solver.arch import chosen
 from solver.assets import asset_path
+from solver.effects.effect import Effect
 from solver.plugins import origin
 from solver.scenes.body import Body, Members
 from solver.scenes.scene import Scene
@@ -58,7 +59,10 @@ def _decisive(scene: Scene) -> dict[str, Any]:
         "numerics": _set(scene.numerics),
         **({"contact": changed} if (changed := _set(scene.contact)) else {}),
         **({"law of": package} if (package := origin("contact_law", scene.contact.law)) else {}),
-        "effects": [[effect.name, *_set(effect), *_package("effect", effect.name)] for effect in scene.effects],
+        "effects": [
+            [effect.name, *_set(effect), *_package("effect", effect.name), *_revision(effect)]
+            for effect in scene.effects
+        ],
         "gravity": scene.gravity,
         "axis": scene.axis,
         "materials": [[material.name, *_set(material)] for material in scene.materials],
@@ -86,6 +90,11 @@ def _package(kind: str, name: str) -> list[str]:
     """Package and version that a plug-in comes from; nothing for what this program has itself."""
     package = origin(kind, name)
     return [package] if package else []
+
+
+def _revision(effect: Effect) -> list[int]:
+    """Of an effect whose pours are not those of its first revision."""
+    return [effect.revision] if effect.on and effect.revision > 1 else []
 
 
 def _of_body(body: Body) -> list[Any]:

@@ -26,6 +26,8 @@ from solver.laws.law import normal_force, tangential_force
 
 HELD_OVERLAP = 1e-45
 """Overlap [m] that stands for surfaces held at a gap: their contact radius, 1e-24 m, bears and damps nothing."""
+APART = 1e-20
+"""Contact radius [m] below which surfaces are held at a gap and do not touch."""
 
 
 @ti.func
@@ -62,22 +64,26 @@ def push_wall(s: ti.template(), w, k, point, force, couple, held):
 
 
 @ti.func
-def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, damper, mass):
+def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, damper, mass, part):
     """What effects see of entry ``k`` before they act."""
     row = s.contact.law[w, k]
     law = s.law.row[w, row]
     scale = scale_of(s, w, k, law)
     v_n = velocity.dot(n)
+    before = s.contact.radius[w, k]
+    if before < APART:
+        before = 0.0
     return Touch(
         normal=n,
         overlap=overlap,
         reduced_radius=s.contact.reduced_radius[w, k],
         mass=mass,
+        part=part,
         v_n=v_n,
         v_t=velocity - v_n * n,
         omega=omega,
         dt=s.world.dt[w],
-        before=s.contact.radius[w, k],
+        before=before,
         e_star=law.e_star,
         g_star=s.contact_law.shear_modulus(law, scale, a),
         restitution=s.effect.row[w, row, ti.static(COLUMNS[-1])],
@@ -86,6 +92,7 @@ def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, da
         elastic=elastic,
         adhesive=elastic,
         work=0.0,
+        pull_off=0.0,
         damper=damper,
         shear_damper=s.contact_law.shear_damper(law, scale, a, mass),
         floor=0.0,
@@ -114,19 +121,21 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega, mass, part, sti
     before = s.contact.radius[w, k]
     v_n = velocity.dot(n)
     v_t = velocity - v_n * n
-    pressed = overlap
+    pressed, began = overlap, before
     if ti.static(s.effects):
         pressed = ti.max(HELD_OVERLAP, overlap)
+        if overlap > 0.0 and before < APART:
+            began = 0.0
     contact_radius = ti.sqrt(s.contact.reduced_radius[w, k] * pressed)
     hertz_radius = contact_radius
     spring_force = s.contact_law.normal_spring_force(law, scale, contact_radius, pressed)
-    damper = s.contact_law.normal_damper(law, scale, contact_radius, mass, before, pressed, v_n, dt)
+    damper = s.contact_law.normal_damper(law, scale, contact_radius, mass, began, pressed, v_n, dt)
     elastic, floor, pull, released, last_half = spring_force, 0.0, 0.0, 0, 0.0
     if ti.static(s.sharing):
         elastic, damper = part * spring_force, part * damper
     touch = Touch(force=0.0)
     if ti.static(s.effects):
-        touch = touch_of(s, w, k, n, overlap, velocity, omega, contact_radius, elastic, damper, mass)
+        touch = touch_of(s, w, k, n, overlap, velocity, omega, contact_radius, elastic, damper, mass, part)
         touch = pass_stage(s, w, k, touch, Stage.NORMAL, still)
         touch = pass_stage(s, w, k, touch, Stage.ADHESION, still)
         contact_radius, elastic, damper = touch.radius, touch.elastic, touch.damper

@@ -1,6 +1,7 @@
 """What is changed in a world that runs: laws, effects, entering bodies, walls, gravity. One small kernel per errand."""
 
 from solver.backend import serial, ti
+from solver.effects.columns import COLUMNS, MEMORIES, MEMORY
 from solver.engine.kernels.sleep import rouse_all
 from solver.engine.kernels.transfer import Row, Table
 from solver.engine.state import Vec3, Vec4
@@ -23,6 +24,19 @@ def load_law(s: ti.template(), w: ti.i32, table: Table, kinds: ti.i32):
         s.law.row[w, k] = s.law_row(*[table[k, c] for c in ti.static(range(len(s.contact_law.columns)))])
 
 
+@ti.func
+def forget_switched(s: ti.template(), w, k, table: ti.template()):
+    """What contacts of row ``k`` keep of effects that ``table`` switches on or off there begins anew."""
+    for index in ti.static(range(len(MEMORIES))):
+        if ti.static(MEMORIES[index] > 0):
+            was_on = s.effect.row[w, k, ti.static(COLUMNS[index])] != 0.0
+            if was_on != (table[k, ti.static(COLUMNS[index])] != 0.0):
+                for c in range(s.world.contacts[w]):
+                    if s.contact.law[w, c] == k:
+                        for d in ti.static(range(MEMORIES[index])):
+                            s.memory.number[w, c, ti.static(MEMORY[index] + d)] = 0.0
+
+
 @ti.kernel
 def load_effects(s: ti.template(), w: ti.i32, table: Table, grip: ti.f64):
     """Parameters of the effects of every pair of kinds, row a · kinds + b, and how far apart [m] a pull may hold."""
@@ -33,6 +47,8 @@ def load_effects(s: ti.template(), w: ti.i32, table: Table, grip: ti.f64):
     s.world.outdated[w] = 1
     ti.loop_config(serialize=ti.static(serial()))
     for k in range(table.shape[0]):
+        if ti.static(s.effects):
+            forget_switched(s, w, k, table)
         for column in range(table.shape[1]):
             s.effect.row[w, k, column] = table[k, column]
 

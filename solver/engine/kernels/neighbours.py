@@ -292,6 +292,8 @@ def rebuild(s: ti.template(), w):
             place_members(s, w, b, True)
             bound(s, w, b)
     fill_grid(s, w)
+    # Entries that were lost once have let bodies through each other, however well the next list fits.
+    overflowed = s.world.overflow[w]
     for narrow in range(2):
         if narrow == 0 or s.world.overflow[w] == 1:
             # A dense bed that moves fast as a whole may not fit; with the least margins it is built more often.
@@ -308,6 +310,7 @@ def rebuild(s: ti.template(), w):
                         list_members(s, w, i, near)
                         list_primitives(s, w, i)
                         list_patches(s, w, i)
+    s.world.overflow[w] = ti.max(overflowed, s.world.overflow[w])
     carry_over(s, w, n_old)
     if ti.static(s.sharing):
         find_leads(s, w)

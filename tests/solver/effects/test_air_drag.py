@@ -9,6 +9,7 @@ from solver.engine.state import Vec3
 from solver.engine.tables import outline
 from solver.scenes.body import Body, Members
 from solver.scenes.material import Material
+from solver.shapes.solid import Solid
 from solver.single_body.free_world import EARTH, RADIUS, FreeWorld, sphere
 from tests.solver.effects.cases import felt, scene_with
 
@@ -115,7 +116,7 @@ def test_a_flake_falls_slower_flat_than_on_edge():
         (2e-9, 2e-9, 4e-9),
     )
     flake = Body("grain", "grain", 1.0, spheres, 400.0)
-    assert outline(flake)[:3] == pytest.approx(axes)
+    assert outline(flake)[:3] == pytest.approx(axes * np.sqrt(outline(flake)[4]))
     lab = FreeWorld(scene_with(felt("air_drag", strength=1.0), bodies=(flake,)), 2, dt=1e-3, plate=False)
     half = np.sqrt(0.5)
     lab.put(0, (0.0, 0.0, 0.0), velocity=(0.0, 0.0, -1.0))
@@ -126,4 +127,17 @@ def test_a_flake_falls_slower_flat_than_on_edge():
     diameter, sphericity = outline(flake)[3:]
     assert diameter == pytest.approx((6.0 * 1e-4 / 400.0 / np.pi) ** (1.0 / 3.0))
     c_d = haider_levenspiel(AIR_DENSITY * diameter / AIR_VISCOSITY, sphericity)
-    assert slowed[0] == pytest.approx(1e-3 / 1e-4 * 0.5 * AIR_DENSITY * c_d * np.pi * 1e-4, rel=1e-9)
+    shown = sphericity * np.pi * 1e-4
+    assert slowed[0] == pytest.approx(1e-3 / 1e-4 * 0.5 * AIR_DENSITY * c_d * shown, rel=1e-9)
+
+
+def test_a_body_shows_on_average_what_the_sphere_of_its_volume_shows():
+    """C_D is by ¼ π D². Thomsen gives the surface within 1.1 %, 4000 directions the mean within 1 %."""
+    grain = Body("grain", "grain", 1.0, Solid("ellipsoid", (12e-3, 8e-3, 3e-3)), 400.0)
+    *axes, diameter, sphericity = outline(grain)
+    assert sphericity < 0.9
+    winds = np.random.default_rng(1).normal(size=(4000, 3))
+    winds /= np.linalg.norm(winds, axis=1)[:, None]
+    out = np.zeros(len(winds))
+    areas(np.column_stack([np.tile(axes, (len(winds), 1)), winds]), out)
+    assert out.mean() == pytest.approx(0.25 * np.pi * diameter**2, rel=0.02)

@@ -12,10 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solver.engine.kernels.neighbours import AHEAD, LEAST, MOST
+from solver.engine.state import Capacity
+from solver.engine.tables import body_tables
+from solver.engine.world import SUMMARY_COLUMNS, Batch
 from solver.scenes.body import Body, Members
 from solver.scenes.insertion import random_quaternion, rotation_matrix
 from solver.scenes.material import Pair
-from solver.single_body.free_world import GRAIN, ROOM, WALL, FreeWorld, scene_of
+from solver.scenes.time_step import time_step
+from solver.single_body.free_world import GRAIN, ROOM, UPRIGHT, WALL, FreeWorld, scene_of, sphere
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
@@ -164,3 +168,17 @@ def test_no_contact_is_missed_while_bodies_of_different_sizes_fly_into_each_othe
         met += int((between < -2e-5).sum())
     assert met > 50
     assert lab.run(1)["rebuilds"] > 20
+
+
+def test_a_list_that_did_not_fit_once_is_told_though_the_next_one_fits():
+    """Two spheres reach a third at once, where one entry has room, pass through, and part."""
+    pairs = (Pair("grain", "grain", 0.0, 1.0), Pair("grain", "wall", 0.0, 1.0))
+    scene = scene_of((sphere(),), (GRAIN, WALL), pairs)
+    batch = Batch(Capacity(worlds=1, bodies=8, members=8, contacts=1))
+    batch.load(0, scene, body_tables(scene, np.zeros(3, dtype=np.int32)), time_step(scene), (False,))
+    for b, (x, speed) in enumerate(((-0.0102, 1.0), (0.0, 0.0), (0.0102, -1.0))):
+        batch.enter(0, b, np.array([x, 0.0, 0.0]), UPRIGHT, np.array([speed, 0.0, 0.0]), np.zeros(3))
+    steps = np.array([round(0.03 / time_step(scene))], dtype=np.int32)
+    summary = dict(zip(SUMMARY_COLUMNS, batch.advance(steps)[0].tolist(), strict=True))
+    assert summary["contacts"] == 0
+    assert summary["overflow"] == 1

@@ -66,7 +66,14 @@ FEW = {
     "funnel": {"rig.mass": 1.5e-3, "rig.outlet_height": 0.02},
     "mesh_funnel": {"rig.mass": 1.5e-3, "rig.outlet_height": 0.02},
     "lifting_cylinder": {"rig.mass": 1.5e-3, "rig.cylinder_height": 0.05, "rig.lift_speed": 0.1},
-    "lipped_plate": {"rig.mass": 1.5e-3, "rig.cylinder_height": 0.05, "rig.lift_speed": 0.1},
+    "lipped_plate": {
+        "rig.mass": 1.5e-3,
+        "rig.cylinder_height": 0.05,
+        "rig.lift_speed": 0.1,
+        "rig.diameter": 0.04,
+        "rig.lip_diameter": 0.05,
+        "insertion.region_radius": 0.015,
+    },
     "draw_down_box": {"rig.mass": 3e-3, "rig.width": 0.12, "rig.depth": 0.04, "rig.shelf_height": 0.03},
     "rotating_drum": {
         "rig.diameter": 0.06,
@@ -102,7 +109,15 @@ def pours() -> dict[str, Scene]:
     several = {"body.spheres": "coarse", "rig.mass": 4e-3, "insertion.rate": 0.1, "insertion.lead": 0.02}
     several |= {"numerics.duration": 0.8, "body.seed.size_distribution": "uniform", "body.seed.size_spread": 0.1}
     found["pour of a mixture of solids"] = with_values(load_material("sunflower_extract"), several)
-    return found | {f"pour with {kind.name}": with_effects(funnel, felt(kind.name)) for kind in set_up_effects()}
+    return found | {
+        f"pour with {_revised(kind.name)}": with_effects(funnel, felt(kind.name)) for kind in set_up_effects()
+    }
+
+
+def _revised(name: str) -> str:
+    """An effect with its revision, if that is not its first: another revision is another case."""
+    revision = EFFECTS[name].revision
+    return f"{name}, revision {revision}" if revision > 1 else name
 
 
 def heap_numbers(scenes: Mapping[str, Scene], worlds: int = 1, first: int = 0) -> tuple[Numbers, Numbers]:
@@ -198,7 +213,7 @@ def defaults() -> dict[str, float | str]:
 def everything(folder: Path) -> tuple[Numbers, Numbers]:
     """Early and late numbers of all cases; those without steps have late ones only. ``folder``: an empty one."""
     plain, beside = {"heap, alone": TREFOIL}, {"heap, second of three": TREFOIL}
-    moved = {f"heap with {name}": with_effects(TREFOIL, felt(name)) for name in IN_KERNELS}
+    moved = {f"heap with {_revised(name)}": with_effects(TREFOIL, felt(name)) for name in IN_KERNELS}
     moved |= {f"heap, {name}": with_values(TREFOIL, {f"contact.{key}": name}) for name, key in CONVENTIONS.items()}
     poured = pours()
     # A batch with room for a mesh is another kernel.

@@ -135,7 +135,8 @@ def unrecorded(golden: Golden, now: Golden) -> str | None:
     """What the golden file does not hold yet, or holds for nothing; None: it is up to date."""
     if now.physics != golden.physics:
         return f"PHYSICS is {now.physics} and the golden file is of {golden.physics}: record it (make golden)"
-    names = set(golden.defaults) ^ set(now.defaults) | set(now.machines[0].digests) ^ set(golden.machines[0].digests)
+    cases = {name for bits in golden.machines for name in bits.digests}
+    names = set(golden.defaults) ^ set(now.defaults) | set(now.machines[0].digests) ^ cases
     if not names:
         return None
     return f"in the golden file or in the program only: {', '.join(sorted(names))}; record it (make golden)"
@@ -148,7 +149,9 @@ def _differing(golden: Golden, now: Golden) -> tuple[list[str], str]:
     defaults = [f"default of {path}" for path in changed(golden.defaults, now.defaults)]
     if known is None:
         return apart(golden.first_steps, now.first_steps) + defaults, "first steps (this machine's bits are not known)"
-    return changed(known, today.digests) + defaults, "bits"
+    # A case that this machine has not recorded yet is compared like all of an unknown machine.
+    others = apart({name: state for name, state in golden.first_steps.items() if name not in known}, now.first_steps)
+    return changed(known, today.digests) + others + defaults, "bits"
 
 
 def recorded(golden: Golden | None, now: Golden) -> Golden:
@@ -160,10 +163,12 @@ def recorded(golden: Golden | None, now: Golden) -> Golden:
     if now.physics > golden.physics:
         return replace(now, before=replace(golden, before=None, first_steps={}))
     (today,) = now.machines
-    # A machine that has not run a new case is recorded again when it does.
-    others = [bits for bits in golden.machines if bits.machine != today.machine]
-    kept = [bits for bits in others if set(bits.digests) == set(today.digests)]
-    return replace(now, machines=(today, *kept), before=golden.before)
+    others = [
+        replace(bits, digests={name: bits.digests[name] for name in bits.digests if name in today.digests})
+        for bits in golden.machines
+        if bits.machine != today.machine
+    ]
+    return replace(now, machines=(today, *others), before=golden.before)
 
 
 def read() -> Golden:

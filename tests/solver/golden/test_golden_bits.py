@@ -132,3 +132,17 @@ def test_what_is_written_is_what_is_read(tmp_path, monkeypatch):
     again = read()
     assert replace(again, first_steps={}) == replace(whole, first_steps={})
     assert np.array_equal(again.first_steps["heap"], STATE)
+
+
+def test_a_machine_without_a_new_case_compares_that_case_by_its_first_steps():
+    """Its other bits stay, and count, until it has recorded the new case itself."""
+    both = recorded(golden(), golden(machine=THERE, drum="d"))
+    both = replace(both, first_steps=both.first_steps | {"drum": STATE})
+    assert [set(bits.digests) for bits in both.machines] == [{"heap", "pour", "drum"}, {"heap", "pour"}]
+
+    def here(heap="a", drum=STATE):
+        return replace(golden(heap, drum="of here"), first_steps={"heap": STATE, "drum": drum})
+
+    assert contradiction(both, here()) is unrecorded(both, here()) is None
+    assert "heap" in contradiction(both, here(heap="b"))
+    assert "drum" in contradiction(both, here(drum=STATE + 3.0 * TOLERANCE))

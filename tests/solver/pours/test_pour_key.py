@@ -72,6 +72,15 @@ def test_every_effect_counts_and_one_that_is_off_does_not():
     assert pour_key(with_values(SCENE, {"effect.rolling_resistance.rolling_friction": 0.0}), 1) == KEY
 
 
+def test_the_revision_of_an_effect_counts_for_the_pours_in_which_it_acts(monkeypatch):
+    acting = with_values(SCENE, {"effect.twisting.strength": 5.0})
+    before = pour_key(acting, 1)
+    monkeypatch.setattr(EFFECTS["twisting"], "revision", EFFECTS["twisting"].revision + 1)
+    assert pour_key(acting, 1) != before
+    assert pour_key(SCENE, 1) == KEY
+    assert pour_key(with_values(SCENE, {"effect.twisting.strength": 0.0}), 1) == KEY
+
+
 def test_titles_and_what_was_assumed_do_not_count():
     assert pour_key(dataclasses.replace(SCENE, title="renamed", assumed=("numerics.skin",)), 1) == KEY
 
