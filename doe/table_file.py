@@ -2,9 +2,10 @@
 
 CSV has its cells between commas, semicolons or tabs, and its numbers with a decimal point or comma. Programs set to
 German, French and many other languages write ``;`` between cells and a comma in numbers. The header decides: what
-stands in it most often is the delimiter, and only beside a comma as the delimiter a comma is no decimal sign. The
-characters are UTF-8 with or without a mark, UTF-16 with one, or else Windows's (cp1252). Lines that begin with # are
-comments, also where a spreadsheet has quoted them or filled them up with delimiters.
+stands in it most often is the delimiter, and only beside a comma as the delimiter a comma is no decimal sign; a header
+of one name has no delimiter. The characters are UTF-8 with or without a mark, UTF-16 with one, or else Windows's
+(cp1252). Lines that begin with # are comments, also where a spreadsheet has quoted them or filled them up with
+delimiters.
 """
 
 from __future__ import annotations
@@ -70,6 +71,17 @@ def read_table(
     if text is None:
         raise wrong(f"{path}: neither text nor a workbook ({WORKBOOK})")
     return csv_table(text, lambda line, what: wrong(f"{path}{place.format(line)}: {what}"), comments)
+
+
+def check_cells(table: CellTable, wrong: Callable[[int, str], Exception]) -> None:
+    """Raise ``wrong(line, what)`` for the first row that has another number of cells than the header."""
+    for line, cells in table.rows:
+        if len(cells) != len(table.rows[0][1]):
+            raise wrong(
+                line,
+                f"{len(cells)} cells; allowed: {len(table.rows[0][1])}, one per column (with decimal commas the cells "
+                "are divided by semicolons or tabs)",
+            )
 
 
 def read_text(path: Path, most_bytes: int, wrong: Callable[[str], Exception]) -> str:
@@ -142,7 +154,9 @@ def csv_table(text: str, wrong: Callable[[int, str], Exception], trailing_commen
         content = _without_comment(line) if trailing_comments and "#" in line else line
         if content.strip(" ,;\t"):
             lines.append((number, content))
-    delimiter = max(DELIMITERS, key=lines[0][1].count) if lines else ","
+    header = lines[0][1] if lines else ","
+    # Below a header of one name a comma can only be decimal.
+    delimiter = max(DELIMITERS, key=header.count) if any(map(header.count, DELIMITERS)) else ";"
     return CellTable(tuple(_rows(lines, delimiter, wrong)), tuple(comments), delimiter != ",")
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from doe.analysis.few_terms import partial_aliases
+from doe.analysis.few_terms import main_effect_aliases
 from doe.analysis.replicates import row_moments
 from doe.designs.plackett_burman import tables
 from doe.record import Record
@@ -106,7 +106,7 @@ def screening_contrasts(levels: IntArray, names: Sequence[str]) -> Contrasts:
     """
     unused = _unused_columns(levels)
     dummies = tuple(f"D{j + 1}" for j in range(unused.shape[1]))
-    return Contrasts(np.hstack([levels, unused]), (*names, *dummies), dummies, partial_aliases(levels, names))
+    return Contrasts(np.hstack([levels, unused]), (*names, *dummies), dummies, main_effect_aliases(levels, names))
 
 
 def curvature(levels: FloatArray, responses: FloatArray) -> Curvature | None:

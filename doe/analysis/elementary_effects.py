@@ -1,7 +1,8 @@
 """Elementary effects of a Morris design: which of many factors act, and which of them bend or act with others?
 
-Two runs, one after the other, that differ in one factor alone by d of its range give its elementary effect
-e = (change of the response)/d, the response's change from low to high if it went on like that. Over the trajectories:
+Two runs of a trajectory, one after the other, that differ in one factor alone by d of its range give its elementary
+effect e = (change of the response)/d, the response's change from low to high if it went on like that. A trajectory ends
+where none or several factors change, or one that has changed in it before. Over the trajectories:
 mu their mean, mu* the mean of |e| (a factor that acts up here and down there has mu near 0, but not mu*), sigma their
 standard deviation, which is 0 of a factor that acts linearly and alone (and has the noise of the runs in it). Source:
 Morris 1991, Technometrics 33:161, doi 10.1080/00401706.1991.10484804; Campolongo, Cariboni and Saltelli 2007, Environ.
@@ -58,22 +59,38 @@ class ElementaryEffects(Record):
         return tuple(sorted(self.effects, key=lambda one: -one.mu_star if math.isfinite(one.mu_star) else math.inf))
 
 
-def elementary_effects(coded: FloatArray, responses: FloatArray, names: Sequence[str]) -> ElementaryEffects:
+def elementary_effects(
+    coded: FloatArray, responses: FloatArray, names: Sequence[str], others: FloatArray | None = None
+) -> ElementaryEffects:
     """Return the effects of rows in the order of their trajectories; a row's replicates count as their mean.
 
-    coded: (rows, k), low = -1, high = +1. responses: (rows, replicates), NaN where a run is missing.
+    coded: (rows, k), low = -1, high = +1. responses: (rows, replicates), NaN where a run is missing. others: the same
+    as coded of factors whose effects are not asked for, NaN where a level is unknown; they stay in every step.
     Raises StatisticsError where no two neighbours differ in one factor alone.
     """
     values = row_moments(require_matrix("responses", responses, rows=len(coded)))[0]
-    moved = np.diff(coded, axis=0)
-    single = np.flatnonzero((np.abs(moved) > SAME).sum(axis=1) == 1)
+    moved = np.diff(coded if others is None else np.hstack([coded, others]), axis=0)
+    steps = _steps(~(np.abs(moved) <= SAME))
+    single, factor = np.array([step for step in steps if step[1] < len(names)], dtype=np.int64).reshape(-1, 2).T
     if not len(single):
         raise StatisticsError("coded: no two rows that follow one another differ in one factor alone; no Morris design")
-    factor = np.abs(moved[single]).argmax(axis=1)
     change = np.diff(values)[single] / (moved[single, factor] / 2)
     known = ~np.isnan(change)
     found = [_effect(name, change[known & (factor == k)]) for k, name in enumerate(names)]
     return ElementaryEffects(_corrected(found), len(single), int((~known).sum()))
+
+
+def _steps(changed: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Row and factor of each step within a trajectory. changed: (rows - 1, factors), from a row to the next."""
+    found, gone = [], set[int]()
+    for row, factors in enumerate(changed):
+        own = np.flatnonzero(factors).tolist()
+        if len(own) != 1 or own[0] in gone:
+            gone.clear()
+        else:
+            gone.add(own[0])
+            found.append((row, own[0]))
+    return found
 
 
 def _effect(name: str, effects: FloatArray) -> ElementaryEffect:

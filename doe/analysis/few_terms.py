@@ -13,11 +13,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
 
+from doe.analysis.surface import with_intercept
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
@@ -26,6 +28,8 @@ MOST_TERMS, MOST_FACTORS = 3, 11
 SHOWN, WITHIN = 5, 4.0
 """Models that are kept: so many at most, with AICc this near to the lowest (Burnham and Anderson 2002, ch. 2)."""
 PERMUTATIONS, SEED = 499, 1
+DUST = 1e-9
+"""Of a share: what rounding leaves."""
 
 
 @dataclass(frozen=True)
@@ -74,20 +78,30 @@ def few_terms(levels: IntArray, names: Sequence[str], means: FloatArray) -> tupl
     )
 
 
-def partial_aliases(levels: IntArray, names: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """Return for every factor the interactions of two others that its column carries in part: "1/3 B*C", "-1/3 B*D"."""
-    rows = len(levels)
-    found: dict[str, tuple[str, ...]] = {}
-    for k, name in enumerate(names):
-        shared = []
-        for i, j in combinations([i for i in range(len(names)) if i != k], 2):
-            common = int((levels[:, k] * levels[:, i] * levels[:, j]).sum())
-            if common and abs(common) < rows:
-                part = math.gcd(common, rows)
-                sign = "-" if common < 0 else ""
-                shared.append(f"{sign}{abs(common) // part}/{rows // part} {names[i]}*{names[j]}")
-        found[name] = tuple(shared)
-    return found
+def main_effect_aliases(levels: IntArray, names: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Return for every factor the interactions of two that its effect holds, wholly or in part: "-B*C", "1/3 B*D".
+
+    Of the columns Z of the interactions the least squares of the intercept and the factors X hold (X'X)^-1 X'Z.
+    """
+    columns, titles = _columns(levels.astype(np.float64), names)
+    model, pairs = with_intercept(columns[:, : len(names)]), columns[:, len(names) :]
+    shares = np.linalg.solve(model.T @ model, model.T @ pairs)[1:]
+    return {
+        name: tuple(
+            _part(share, len(levels)) + title
+            for share, title in zip(own.tolist(), titles[len(names) :], strict=True)
+            if abs(share) > DUST
+        )
+        for name, own in zip(names, shares, strict=True)
+    }
+
+
+def _part(share: float, rows: int) -> str:
+    """A share in words before an interaction: nothing or a minus for the whole, a fraction of the rows if it is one."""
+    fraction = Fraction(share).limit_denominator(rows)
+    if abs(fraction - share) > DUST:
+        return f"{share:.3g} "
+    return {"1": "", "-1": "-"}.get(str(fraction), f"{fraction} ")
 
 
 def _columns(levels: FloatArray, names: Sequence[str]) -> tuple[FloatArray, list[str]]:

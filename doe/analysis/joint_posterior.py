@@ -106,6 +106,11 @@ def _grid(low: FloatArray, high: FloatArray, cells: int) -> tuple[list[FloatArra
     return axes, np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
 
 
+def least_error(model: Surface, target: Target) -> float:
+    """Least standard error to tell a miss by, of a model without error or slope against a target without error."""
+    return max(LEAST_ERROR * max(abs(target.mean), abs(float(model.coefficients[0]))), np.finfo(np.float64).tiny)
+
+
 def _misses(
     models: Sequence[Surface], targets: Sequence[Target], points: FloatArray, within_cells: bool = False
 ) -> tuple[FloatArray, FloatArray]:
@@ -117,9 +122,7 @@ def _misses(
             k = points.shape[1]
             steps = np.gradient(values.reshape([CELLS[k]] * k))
             variance += sum(step.ravel() ** 2 for step in (steps if k > 1 else [steps])) / 12.0
-        # A model without error or slope against a target without error: there is no size to tell a miss by.
-        least = max(LEAST_ERROR * max(abs(target.mean), abs(float(model.coefficients[0]))), np.finfo(np.float64).tiny)
-        errors.append(np.maximum(np.sqrt(variance), least))
+        errors.append(np.maximum(np.sqrt(variance), least_error(model, target)))
         missed.append((values - target.mean) / errors[-1])
     return np.array(missed), np.array(errors)
 

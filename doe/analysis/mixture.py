@@ -19,7 +19,7 @@ from scipy import stats
 
 from doe.analysis.replicates import require_matrix
 from doe.analysis.surface import least_squares
-from doe.analysis.surface_anova import FULL, AnovaRow
+from doe.analysis.surface_anova import FULL, AnovaRow, total_sum_of_squares
 from doe.designs.mixture import simplex_lattice
 from doe.errors import StatisticsError
 from doe.record import Record
@@ -29,6 +29,8 @@ MixtureOrder = Literal["linear", "quadratic", "special cubic"]
 MIXTURE_ORDERS: tuple[MixtureOrder, ...] = get_args(MixtureOrder)
 LEAST_DF = 3
 """For the error, where no order is asked for."""
+SLACK = 1e-9
+"""Of a high, in shares."""
 STEPS = (1000, 100, 40, 20, 10, 8, 6, 5, 4, 3, 2)
 MOST_LOOKED_AT = 13_000
 """The highest and the lowest blend are looked for in the smallest steps that make no more blends than these."""
@@ -103,11 +105,13 @@ def fit_mixture(
     lows: FloatArray,
     names: Sequence[str],
     order: MixtureOrder | None = None,
+    highs: FloatArray | None = None,
 ) -> MixtureFit:
     """Fit the polynomial of an order, or of the highest that the runs bear, to every valid run.
 
     amounts: shape (rows, parts), of one sum in every row. responses: (rows, replicates), NaN where a run is missing.
-    lows: least amount of each part. Raises StatisticsError where the runs do not bear it.
+    lows: least amount of each part; highs: the most of it in a blend that is looked for.
+    Raises StatisticsError where the runs do not bear it.
     """
     values = require_matrix("responses", responses, rows=len(amounts))
     row, replicate = np.nonzero(~np.isnan(values))
@@ -132,18 +136,18 @@ def fit_mixture(
     single = np.array([len(term) == 1 for term in terms])
     coefficients = found.params + single * observed[0]
     predicted = model @ coefficients
-    total = float(((observed - observed.mean()) ** 2).sum())
-    residual = float(((observed - predicted) ** 2).sum())
+    total = total_sum_of_squares(observed)
+    residual = _squares(observed - predicted, total)
     leverage = found.get_influence().hat_matrix_diag
     alone = bool((leverage > FULL).any())  # a run that is fitted exactly predicts nothing
-    press = math.nan if alone else float((((observed - predicted) / (1 - leverage)) ** 2).sum())
+    press = math.nan if alone else _squares((observed - predicted) / (1 - leverage), total)
     mean_square = residual / df
     errors = np.sqrt(mean_square * np.diag(found.normalized_cov_params))
     with np.errstate(divide="ignore", invalid="ignore"):
-        p = np.where(single, math.nan, 2 * stats.t.sf(np.abs(coefficients / errors), df))
+        p = np.where(single | (total == 0), math.nan, 2 * stats.t.sf(np.abs(coefficients / errors), df))
     rows = _rows(shares, observed, names, chosen, total, residual, df)
     step = next(one for one in STEPS if math.comb(len(names) + one - 1, one) <= MOST_LOOKED_AT)
-    grid = simplex_lattice(len(names), step)
+    grid = _within(simplex_lattice(len(names), step), shares, lows, highs, room)
     surface = mixture_matrix(grid, terms)
     on_grid = surface @ coefficients
 
@@ -171,6 +175,21 @@ def fit_mixture(
     )
 
 
+def _squares(differences: FloatArray, total: float) -> float:
+    """Return their sum of squares, zero where the total is, of which rounding alone is left."""
+    return float((differences**2).sum()) if total else 0.0
+
+
+def _within(
+    lattice: FloatArray, run: FloatArray, lows: FloatArray, highs: FloatArray | None, room: float
+) -> FloatArray:
+    """Return the blends of a lattice that keep to the highs; those that were run where it has none."""
+    if highs is None:
+        return lattice
+    kept = lattice[(lows + room * lattice <= highs + SLACK * room).all(axis=1)]
+    return kept if len(kept) else np.unique(run, axis=0)
+
+
 def _rows(
     shares: FloatArray,
     observed: FloatArray,
@@ -196,14 +215,14 @@ def _rows(
     for one in MIXTURE_ORDERS[: MIXTURE_ORDERS.index(order) + 1]:
         model = mixture_matrix(shares, mixture_terms(names, one))
         fitted = model @ np.linalg.lstsq(model, observed, rcond=None)[0]
-        after = float(((observed - fitted) ** 2).sum())
+        after = _squares(observed - fitted, total)
         found.append(row(one, before - after, model.shape[1] - taken, error))
         before, taken = after, model.shape[1]
     found.append(row("residual", residual, df, None))
     _, point = np.unique(shares.round(9), axis=0, return_inverse=True)
     point = point.reshape(-1)
     means = np.bincount(point, weights=observed) / np.bincount(point)
-    pure, pure_df = float(((observed - means[point]) ** 2).sum()), n - len(means)
+    pure, pure_df = _squares(observed - means[point], total), n - len(means)
     if pure_df and df > pure_df:
         found.append(row("lack_of_fit", residual - pure, df - pure_df, (pure, pure_df)))
         found.append(row("pure_error", pure, pure_df, None))

@@ -378,12 +378,13 @@ def _groups(
     powers += [tuple(int(k in pair) for k in range(len(free))) for pair in combinations(range(len(free)), 2)]
     powers += [tuple(2 * int(j == k) for k in range(len(free))) for j in range(len(free))]
     place = np.array([powers.index(tuple(one)) for one in columns.functions[:, free].tolist()])
-    grid = np.array(list(product(*(codes(len(fit.levels[k])) for k in named)))).round(9)
     was_run, counts = np.unique(runs.points[:, named].round(9), axis=0, return_counts=True)
     count = {tuple(one): int(n) for one, n in zip(was_run.tolist(), counts, strict=True)}
     of_names = replace(columns, functions=np.where(np.isin(range(len(fit.levels)), named), columns.functions, 0))
+    few = math.prod(len(fit.levels[k]) for k in named) <= MOST_COMBINATIONS
+    grid = np.array(list(product(*(codes(len(fit.levels[k])) for k in named)))).round(9) if few else was_run
     found = []
-    for combination in grid if len(grid) <= MOST_COMBINATIONS else was_run:
+    for combination in grid:
         point = np.zeros((1, len(fit.levels)))
         point[0, named] = combination
         turned = np.zeros((len(powers), len(columns.names)))

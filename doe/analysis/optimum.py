@@ -32,6 +32,7 @@ import numpy.typing as npt
 from scipy import stats
 from scipy.optimize import minimize
 
+from doe.analysis.joint_posterior import least_error
 from doe.analysis.level_set import REFINEMENTS, crossings, extremes, nearest_points
 from doe.analysis.surface import Surface, fitted_coefficients
 from doe.analysis.surface_anova import analyse_surface
@@ -208,7 +209,10 @@ def find_compromise(models: Sequence[Surface], targets: Sequence[Target], refere
     home = region.coded(np.asarray(reference, dtype=float))
     centre = np.zeros((1, k))
     spread = np.array(
-        [math.hypot(t.standard_error, float(m.standard_error(centre)[0])) for m, t in zip(models, targets, strict=True)]
+        [
+            max(math.hypot(t.standard_error, float(m.standard_error(centre)[0])), least_error(m, t))
+            for m, t in zip(models, targets, strict=True)
+        ]
     )
     weight = np.array([t.weight for t in targets])
     goal = np.array([t.mean for t in targets])

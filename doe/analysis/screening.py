@@ -274,10 +274,11 @@ def select_factors(
     """Return the `n` factors of the next stage, each with its reason.
 
     Significant factors come first by falling |t|, the largest of all targets (`further`: those beside the first, by
-    name), then `fallback` in its order; `exclude` holds factors that this set-up cannot test. Raises StatisticsError
-    when both together give fewer than `n`, or a name is no factor.
+    name), then `fallback` in its order; `exclude` holds columns that this set-up cannot test, be they given up as
+    dummies here and not in `further`. Raises StatisticsError when both together give fewer than `n`, or a name is no
+    factor.
     """
-    known = {effect.name for effect in screening.effects if not effect.is_dummy}
+    known = {effect.name for effect in screening.effects if not effect.is_dummy or effect.name in exclude}
     for name in (*fallback, *exclude):
         if name not in known:
             raise StatisticsError(f"'{name}' is no factor of the screening; allowed are {', '.join(sorted(known))}")

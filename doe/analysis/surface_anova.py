@@ -23,6 +23,7 @@ from doe.record import Record
 FloatArray = npt.NDArray[np.float64]
 FULL = 1 - 1e-9
 """A leverage above this is one: the run is fitted exactly, and nothing can be said against it."""
+CONSTANT = "The response is the same in every run; there is nothing to fit."
 
 
 @dataclass(frozen=True)
@@ -214,7 +215,7 @@ def _notes(
     by_source = {row.source: row for row in rows}
     notes = []
     if total_ss == 0:
-        return ("The response is the same in every run; there is nothing to fit.",)
+        return (CONSTANT,)
     if not better_than_noise:
         predicted = "" if math.isnan(predicted_r2) else f", predicted R² = {predicted_r2:.3g}"
         notes.append(

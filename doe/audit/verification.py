@@ -174,8 +174,10 @@ def _best(ascent: Ascent, target: Target) -> Figure:
 def _targets(response: float, half: float, error: Printed) -> tuple[tuple[float, float], ...]:
     """Intervals of the target that give this error for this response: above it and below it."""
     least, most = max(0.0, error.value - error.half) / 100, (error.value + error.half) / 100
-    above = (response - half) / (1 - least), (response + half) / (1 - most) if most < 1 else np.inf
     below = (response - half) / (1 + most), (response + half) / (1 + least)
+    if least >= 1:
+        return (below,)  # a response of more than nothing is never so far below its target
+    above = (response - half) / (1 - least), (response + half) / (1 - most) if most < 1 else np.inf
     return below, above
 
 

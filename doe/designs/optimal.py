@@ -73,7 +73,7 @@ class Region:
 
     def candidates(self, grid: Sequence[float]) -> FloatArray:
         """Points from which a search starts, shape (n, factors): every combination of low, middle, high and names, and
-        where the constraints end the range of a factor with the others there.
+        where the constraints end the range of a factor with the others there; the sample of a region that those miss.
         """
         corners = [one for one in grid if one in (-1.0, 0.0, 1.0)]
         levels = [codes(names) if names else np.array(corners) for names in self.levels]
@@ -89,7 +89,8 @@ class Region:
                 for level in self.choices(point, factor, ())[[0, -1]]:
                     ends.append([*point[:factor], level, *point[factor + 1 :]])
         every = np.vstack([points, *ends]) if ends else points
-        return np.unique(every[self.allowed(every)].round(12), axis=0)
+        found = np.unique(every[self.allowed(every)].round(12), axis=0)
+        return found if len(found) else self.sample
 
     @cached_property
     def sample(self) -> FloatArray:

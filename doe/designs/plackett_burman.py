@@ -140,7 +140,8 @@ def interaction_overlap(design: IntArray) -> float:
 def _interactions(design: IntArray) -> tuple[IntArray, tuple[tuple[int, int], ...]]:
     """Return the columns of all two-factor interactions, shape (runs, pairs), and the pairs of column indices."""
     pairs = tuple(combinations(range(design.shape[1]), 2))
-    return np.stack([design[:, i] * design[:, j] for i, j in pairs], axis=1), pairs
+    one, other = np.array(pairs, dtype=np.int64).reshape(-1, 2).T  # of one column there are none
+    return design[:, one] * design[:, other], pairs
 
 
 def _levels(signs: str) -> IntArray:

@@ -248,7 +248,7 @@ def _check_one_way(table: Table, row: Reading, direct: str, both: tuple[str, str
 
 
 def _check(table: Table, row: Reading) -> None:
-    """One of the two measurements must be there, and a rebound must be slower than the fall."""
+    """One of the two measurements must be there, a rebound be slower than the fall, and e lie in 0 … 1."""
     speeds = [name for name in ("v_x", "v_z") if name in row.values]
     if len(speeds) == 1:
         raise table.wrong(row, speeds[0], "stands alone; allowed: both of v_x_m_s and v_z_m_s, or none")
@@ -257,3 +257,7 @@ def _check(table: Table, row: Reading) -> None:
     fall = math.sqrt(2.0 * GRAVITY * row.values["drop_height"])
     if speeds and math.hypot(row.values["v_x"], row.values["v_z"]) > fall:
         raise table.wrong(row, "v_x_m_s", f"the rebound is faster than the fall, {fall:.4g} m/s")
+    if speeds and not 0.0 <= tracked_rebound(row) <= 1.0:
+        raise table.wrong(row, "v_z_m_s", f"(v_x + v_z)/√(2gH) is {tracked_rebound(row):.4g}; allowed: 0 … 1")
+    if "distance" in row.values and paper_estimate(row) > 1.0:
+        raise table.wrong(row, "distance_mm", f"L/(2H) is {paper_estimate(row):.4g}; allowed: up to 1")

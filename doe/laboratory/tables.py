@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from doe.table_file import check_cells
 from doe.table_file import read_table as read_cells
 
 LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
@@ -167,14 +168,8 @@ def read_table(path: Path, layout: Layout) -> Table:
         raise LaboratoryError(f"{path}: no rows; allowed: {_columns_text(layout)}, and readings below")
     (line, header), *readings = found.rows
     columns = _columns(f"{path}, row {line}", header, layout)
-    by_line = []
-    for line, cells in readings:
-        if len(cells) != len(header):
-            raise LaboratoryError(
-                f"{path}, row {line}: {len(cells)} cells; allowed: {len(header)}, one per column (with decimal commas "
-                "the cells are divided by semicolons or tabs)"
-            )
-        by_line.append((line, dict(zip(header, cells, strict=True))))
+    check_cells(found, lambda line, what: LaboratoryError(f"{path}, row {line}: {what}"))
+    by_line = [(line, dict(zip(header, cells, strict=True))) for line, cells in readings]
     if not by_line:
         raise LaboratoryError(f"{path}: no readings below the names of the columns")
     # An optional column of a template that nobody has filled in is as good as none.
@@ -411,7 +406,20 @@ def _row(
         for name, column in columns.items()
         if cells[name] or not column.blank
     }
+    _check_errors(where, cells, columns, values)
     return Reading(line, tuple(cells[key] for key in layout.keys), cells[REPLICATE], values)
+
+
+def _check_errors(
+    where: str, cells: Mapping[str, str], columns: Mapping[str, Column], values: Mapping[str, float]
+) -> None:
+    """Refuse an error that takes a reading down to a value which its column does not allow."""
+    beside = {column.stem: name for name, column in columns.items()}
+    for column in columns.values():
+        half = values.get(f"{column.stem}{ERROR}", 0.0)
+        if not column.zero and half >= values.get(column.stem, math.inf) - column.low:
+            name = beside[f"{column.stem}{ERROR}"]
+            raise LaboratoryError(f"{where}, column {name}: {cells[name]!r}; allowed: below the reading beside it")
 
 
 def _value(where: str, name: str, text: str, column: Column, number: Callable[[str], float]) -> float:

@@ -16,12 +16,14 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.errors import MeasurementError
-from doe.table_file import read_table
+from doe.table_file import check_cells, read_table
 from solver import ParameterError, all_names, named, parse_quantity
 
 Array = npt.NDArray[np.float64]
 MOST_BYTES = 50_000_000
 COLUMNS = ["replicate", "observable", "x", "value"]
+ANGLE = "angle_of_repose"
+"""Beginning of the names of all angles of repose, whatever they are read off; one flank may slope the other way."""
 UNIT_SUFFIXES = ("m", "cm", "mm", "um", "s", "ms", "kg", "g", "mg", "deg", "rad")
 """Endings by which a name is recognised as an observable in another unit."""
 
@@ -57,12 +59,11 @@ def read_long_form(path: Path) -> LongForm:
             rows.append(row)
     if not rows:
         raise MeasurementError(f"{path}: no row with a known observable")
-    replicates = max(row.replicate for row in rows)
-    missing = sorted(set(range(1, replicates + 1)) - {row.replicate for row in rows})
-    if missing:
-        raise MeasurementError(
-            f"{path}: replicate: {missing[0]} is missing of {replicates}; allowed: numbers from 1 on"
-        )
+    numbers = sorted({row.replicate for row in rows})
+    replicates = len(numbers)
+    missing = next((k for k, number in enumerate(numbers, start=1) if number != k), None)
+    if missing is not None:
+        raise MeasurementError(f"{path}: replicate: {missing} is missing of {numbers[-1]}; allowed: numbers from 1 on")
     by_name: dict[str, list[LongRow]] = {}
     for row in rows:
         by_name.setdefault(row.observable, []).append(row)
@@ -80,9 +81,8 @@ def _rows(path: Path) -> Iterator[LongRow | str]:
         raise MeasurementError(
             f"{path}:{line}: columns {','.join(header)}; allowed: {','.join(COLUMNS)}, and unit after them"
         )
+    check_cells(table, lambda line, what: MeasurementError(f"{path}:{line}: {what}"))
     for line, cells in rows:
-        if len(cells) != len(header):
-            raise MeasurementError(f"{path}:{line}: {len(cells)} cells; allowed: {len(header)}, one per column")
         yield _row(f"{path}:{line}", line, dict(zip(header, cells, strict=True)), table.number)
 
 
@@ -103,12 +103,14 @@ def _row(where: str, line: int, cells: dict[str, str], number: Callable[[str], f
 
 def _value(where: str, cells: dict[str, str], unit: str, number: Callable[[str], float]) -> float:
     value = _finite(where, "value", cells["value"], unit, number)
-    if cells.get("unit", unit) in (unit, ""):
-        return value
-    try:
-        return value * parse_quantity(f"1{cells['unit']}", unit, "unit")
-    except ParameterError as error:
-        raise MeasurementError(f"{where}: {error}") from None
+    if cells.get("unit", unit) not in (unit, ""):
+        try:
+            value *= parse_quantity(f"1{cells['unit']}", unit, "unit")
+        except ParameterError as error:
+            raise MeasurementError(f"{where}: {error}") from None
+    if cells["observable"].startswith(ANGLE) and not -90.0 < value < 90.0:
+        raise MeasurementError(f"{where}: value: {cells['value']!r}; allowed: above -90 deg and below 90 deg")
+    return value
 
 
 def _finite(where: str, column: str, text: str, unit: str, number: Callable[[str], float]) -> float:

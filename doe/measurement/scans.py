@@ -1,7 +1,8 @@
 """Scanned surfaces: ``scans/<condition>_<k>.*`` → the height map of replicate k, on the axis of the rig.
 
     .ply .stl           a surface; its facets are sampled
-    .xyz .txt .csv      points x, y, z in the first three columns, with or without a header
+    .xyz .txt .csv      points x, y, z in the first three columns, with or without a header; a comma is a decimal sign
+                        where semicolons, tabs or blanks stand between the cells
     .npz                height (n, m), x (n,), y (m,); NaN where nothing was seen
     .tif .tiff          16 bit, a column per x and a row per y from +y down; 0 where nothing was seen
 
@@ -24,6 +25,7 @@ from pydantic import ConfigDict
 from scipy.spatial import cKDTree
 
 from doe.errors import MeasurementError
+from doe.table_file import decoded
 from solver import TABLE, HeightMap, ParameterError, Quantity, Vector, npz_arrays
 
 Array = npt.NDArray[np.float64]
@@ -263,10 +265,13 @@ def _sampled(triangles: Array) -> Array:
 
 
 def _of_table(path: Path) -> Array:
-    """The first three columns of a table of numbers, separated by commas, semicolons or blanks."""
-    text = path.read_text(encoding="utf-8-sig", errors="replace")
-    rows = [line.replace(";", " ").replace(",", " ").replace("\t", " ") for line in text.splitlines()]
-    rows = [row for row in rows if row.strip() and not row.lstrip().startswith("#")]
+    """The first three columns of a table of numbers, separated by commas, semicolons, tabs or blanks."""
+    text = decoded(path.read_bytes())
+    if text is None:
+        raise MeasurementError("not a text file")
+    rows = [row for line in text.splitlines() if (row := line.strip()) and not row.startswith("#")]
+    comma = "." if rows and _decimal_comma(rows[-1]) else " "
+    rows = [row.replace(",", comma).replace(";", " ") for row in rows]
     if rows and not _numeric(rows[0]):
         rows = rows[1:]
     try:
@@ -274,6 +279,12 @@ def _of_table(path: Path) -> Array:
     except (ValueError, IndexError) as error:
         raise MeasurementError(f"no table of x, y, z ({' '.join(str(error).split())[:100]})") from None
     return np.asarray(found, dtype=np.float64)
+
+
+def _decimal_comma(row: str) -> bool:
+    """Whether a comma in ``row`` is a decimal sign: something else stands between the cells."""
+    cells = row.split()
+    return ";" in row or (len(cells) >= 3 and all(cell.count(",") == cell.strip(",").count(",") <= 1 for cell in cells))
 
 
 def _numeric(row: str) -> bool:

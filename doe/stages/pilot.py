@@ -10,7 +10,7 @@ own rows, its own comparison and the spread of the observable that it reads:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from doe.analysis.pilot import (
@@ -123,8 +123,9 @@ def pilot(study: Study, profile: Profile, runner: Runner, bias: Bias) -> PilotRe
         setting.label: {e: responses([runs], e)[0] for e in study.estimators if experiment_of(e) in setting.experiments}
         for setting, runs in zip(settings, rows, strict=True)
     }
-    noise = {e: replicate_noise(values) for e, values in tables[REFERENCE].items()}
     notes: list[str] = []
+    noise = _noise(tables[REFERENCE], [target.observable for target in study.targets], notes)
+    tables = {label: {e: table[e] for e in table if e in noise} for label, table in tables.items()}
     choice = _choice(tables, target, bias, notes) if study.changes else None
     estimator = target if choice is None else choice.chosen
     spread = _equal_variance({name: table[target] for name, table in tables.items()}, notes)
@@ -168,6 +169,19 @@ def sized(
         sizes.append(StageSize(rule.stage, wanted, needed, taken, rule.resolved(rule.sigma, taken)))
         counts[rule.key] = taken
     return replace(profile, **counts), tuple(sizes)  # type: ignore[arg-type]
+
+
+def _noise(table: Mapping[str, FloatArray], needed: Sequence[str], notes: list[str]) -> dict[str, Noise]:
+    """The noise of every estimator that read two pours; another one is noted, or refused if it is needed."""
+    found = {}
+    for estimator, values in table.items():
+        try:
+            found[estimator] = replicate_noise(values)
+        except StatisticsError as error:
+            if estimator in needed:
+                raise StatisticsError(f"{estimator}: {error}") from None
+            notes.append(f"{estimator} is no candidate for the screening: at the reference setting {error}.")
+    return found
 
 
 def _choice(

@@ -89,7 +89,7 @@ def screening(study: Study, profile: Profile, runner: Runner, response: str) -> 
         [target.observable for target in study.targets[1:]],
     )
     estimated = {effect.name for effect in result.analysis.effects if not effect.is_dummy}
-    exclude = [entry.factor for entry in untestable if entry.factor in estimated]
+    exclude = [entry.factor for entry in untestable]
     fallback = [name for name in study.fallback if name in estimated]
     selected = select_factors(result.analysis, CALIBRATED, fallback, exclude, further=result.further_analyses)
     return dataclasses.replace(result, selected=selected)

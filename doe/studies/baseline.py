@@ -15,6 +15,7 @@ from scipy import stats
 
 from doe.analysis.pilot import Noise
 from doe.analysis.t_tests import Sample, equivalence_test, welch_test
+from doe.analysis.verification import Verdict
 from doe.record import Record
 from doe.studies.study_result import StudyResult
 
@@ -76,15 +77,17 @@ def _verified(before: StudyResult, now: StudyResult) -> Iterator[Compared]:
     for target, old, new in zip(
         now.verification.targets, before.verification.tests, now.verification.tests, strict=True
     ):
-        answer: Answer = "same" if old.verdict == new.verdict else "moved"
-        yield Compared("verdict", target.observable, old.verdict, new.verdict, answer, "")
-        yield Compared(
-            "mean at the optimum",
-            target.observable,
-            old.simulated.mean,
-            new.simulated.mean,
-            *_means(old.simulated, new.simulated, target.margin),
-        )
+        answer, why = _means(old.simulated, new.simulated, target.margin)
+        turned = _verdicts(old.verdict, new.verdict, answer)
+        yield Compared("verdict", target.observable, old.verdict, new.verdict, turned, "")
+        yield Compared("mean at the optimum", target.observable, old.simulated.mean, new.simulated.mean, answer, why)
+
+
+def _verdicts(old: Verdict, new: Verdict, means: Answer) -> Answer:
+    """From or to "cannot tell" chance alone can turn a verdict, so that the means decide whether it moved."""
+    if old == new:
+        return "same"
+    return "moved" if means == "moved" or "cannot tell" not in (old, new) else "cannot tell"
 
 
 def _means(old: Sample, new: Sample, margin: float) -> tuple[Answer, str]:

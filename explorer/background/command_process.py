@@ -197,8 +197,12 @@ class CommandProcess:
         return {"state": "failed", "message": f"{self._command} ended with exit code {code}: {self._last_words()}"}
 
     def _last_words(self) -> str:
-        lines = self._log().read_text(encoding="utf-8", errors="replace").strip().splitlines()
-        return lines[-1][:300] if lines else f"no output; see {self._log()}"
+        log = self._log()
+        try:
+            lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+        except OSError as error:  # taken away, perhaps with the folder that it was in
+            return f"{log}: {error.strerror or error}"
+        return lines[-1][:300] if lines else f"no output; see {log}"
 
     def _take_progress(self) -> None:
         if self.out is None or not (file := self.out / PROGRESS).is_file():

@@ -1,7 +1,8 @@
 """Commands of one kind in the background, such as the studies: one runs at a time, others wait for it.
 
 The next order begins when the one before has come to its end: a report or a failure. A command that was cancelled
-leaves the line waiting for the next start, because who cancels wants quiet.
+leaves the line waiting for the next start, because who cancels wants quiet; so does an order that cannot begin, which
+is told until then.
 """
 
 from __future__ import annotations
@@ -58,6 +59,8 @@ class OrderedCommands(ABC, Generic[Order]):
         self._process, self._folder, self._result, self._what = process, folder, result, what
         self._line: deque[Order] = deque()
         self._follow_up = False
+        self._refused = ""
+        """Why the next order could not begin, until another command does or the line is cleared."""
         self.cancel, self.pause, self.go_on = process.cancel, process.pause, process.go_on
 
     @property
@@ -76,6 +79,7 @@ class OrderedCommands(ABC, Generic[Order]):
     def clear_queue(self) -> None:
         """Forget the orders that wait."""
         self._line.clear()
+        self._refused = ""
 
     def close(self) -> None:
         """Cancel what runs and wait for its end."""
@@ -94,9 +98,9 @@ class OrderedCommands(ABC, Generic[Order]):
                     self._begin_next()
                 except (ValueError, OSError) as error:
                     # Nobody pressed a button that could tell: the status does, and the order still waits.
-                    return replace(status, state="failed", message=f"the next one cannot start: {error}")
-                return self._process.status()
-        return status
+                    self._refused = f"the next one cannot start: {error}; the queue waits for another start"
+                status = self._process.status()
+        return replace(status, state="failed", message=self._refused) if self._refused else status
 
     @abstractmethod
     def _begin(self, order: Order) -> None:
@@ -122,9 +126,9 @@ class OrderedCommands(ABC, Generic[Order]):
     def _start(self, out: Path, arguments: list[str]) -> None:
         """Start a command; its end lets the next order begin, even if nobody looks in between."""
         self._process.start(out, arguments)
-        self._follow_up = True
+        self._follow_up, self._refused = True, ""
 
     def _go_on_in(self, out: Path, arguments: list[str]) -> None:
         """Resume one in its output folder; the same holds of its end."""
         self._process.resume(out, arguments)
-        self._follow_up = True
+        self._follow_up, self._refused = True, ""

@@ -21,12 +21,12 @@ from doe.analysis.optimum import ResponseTarget
 from doe.analysis.random_groups import fit_random
 from doe.analysis.steepest_ascent import Region
 from doe.analysis.surface import Blocks
-from doe.analysis.surface_anova import FULL
+from doe.analysis.surface_anova import CONSTANT, FULL
 from doe.designs import DESIGNS, factor_letters
 from doe.designs.morris import Morris
 from doe.errors import StatisticsError
 from explorer.design.choices import ModelOrder, Reduction, Surrogate
-from explorer.design.factors_file import read_factors, region_of
+from explorer.design.factors_file import factor_words, read_factors, region_of
 from explorer.design.filled_sheet import Runs, read_sheet, runs_of, short
 from explorer.design.result import DesignResult, Response, RunCount, SheetFactor
 from explorer.design.run_plan import BLOCK
@@ -199,20 +199,22 @@ def _mixture(runs: Runs, region: Region, order: AnalyseOrder) -> DesignAnalysis:
     polynomial: MixtureOrder | None = None
     if order.order is not None:
         polynomial = "linear" if order.order == ModelOrder.LINEAR else "quadratic"
-    lows = np.array([factor.low for factor in runs.factors])
+    lows, highs = (np.array([getattr(factor, end) for factor in runs.factors]) for end in ("low", "high"))
     names = factor_letters(len(runs.factors))
     try:
-        found = fit_mixture(region.natural(runs.coded), runs.responses, lows, names, polynomial)
+        found = fit_mixture(region.natural(runs.coded), runs.responses, lows, names, polynomial, highs)
     except StatisticsError as error:
         raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
-    note = "A mixture: the factors add up to one sum in every run, and Scheffé's polynomial stands for the model."
-    return DesignAnalysis((), None, None, None, (note,), mixture=found)
+    notes = ["A mixture: the factors add up to one sum in every run, and Scheffé's polynomial stands for the model."]
+    if not found.rows[-1].sum_of_squares:
+        notes.append(CONSTANT)
+    return DesignAnalysis((), None, None, None, tuple(notes), mixture=found)
 
 
 def _elementary(runs: Runs, region: Region, order: AnalyseOrder) -> DesignAnalysis:
     """The elementary effects of a Morris design; a model of the same runs has to be asked for."""
     try:
-        found = elementary_effects(runs.coded, runs.responses, region.names)
+        found = elementary_effects(runs.coded, runs.responses, region.names, runs.others)
     except StatisticsError as error:
         raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
     note = "Elementary effects; --model linear, a target or --surrogate gp fits a model to the same runs."
@@ -281,7 +283,7 @@ def _refuse_dependent(runs: Runs, region: Region, sheet: str) -> None:
     if int(valid.sum()) <= len(names):
         return  # too few runs for anything, which is told where the model is fitted
     centred = (runs.coded[valid] - runs.coded[valid].mean(axis=0)) / spread
-    *_, singular, vectors = np.linalg.svd(centred, full_matrices=True)
+    *_, singular, vectors = np.linalg.svd(centred, full_matrices=False)
     if singular[-1] > SAME * singular[0]:
         return
     tied = [k for k in range(len(names)) if abs(vectors[-1, k]) > SAME]
@@ -375,15 +377,13 @@ def _order(runs: Runs, order: AnalyseOrder) -> Order | None:
 
 
 def _symbols(runs: Runs, terms: tuple[str, ...]) -> tuple[str, ...]:
-    """Terms in letters; a term may be written with letters or with the names of the factors."""
-    letters = factor_letters(len(runs.factors))
-    known = {factor.name: letter for letter, factor in zip(letters, runs.factors, strict=True)}
-    known |= {letter: letter for letter in letters}
+    """Terms in letters; a term may be written with letters or with the names of the factors (`factor_words`)."""
+    letters, known = factor_letters(len(runs.factors)), factor_words(runs.factors)
 
     def symbol(part: str) -> str:
         if part not in known:
             raise CommandError(f"--terms: no factor {part!r}; allowed: {', '.join(known)}, as in A,B,A*B,A^2")
-        return known[part]
+        return letters[known[part]]
 
     found = []
     for term in terms:

@@ -162,17 +162,23 @@ def is_number(text: str) -> bool:
     return True
 
 
+def factor_words(factors: tuple[DesignFactor, ...]) -> dict[str, int]:
+    """The words that a factor goes by, its name or its letter, and its place: one's name is never another's letter."""
+    names = {factor.name: k for k, factor in enumerate(factors)}
+    letters = enumerate(factor_letters(len(factors)))
+    return names | {letter: k for k, letter in letters if letter not in names}
+
+
 def coded_constraint(text: str, factors: tuple[DesignFactor, ...]) -> tuple[float, ...]:
     """A constraint such as "A + 2 B <= 30" in the factors' units as a_1, …, a_k, b of a x <= b in coded ones.
 
-    Factors go by letter or name. Raises CommandError.
+    Factors go by `factor_words`. Raises CommandError.
     """
     allowed = "allowed: a form such as A + 2*B <= 30, with letters or names of factors"
     sides = re.split("<=|>=|≤|≥", text)
     if len(sides) != 2:
         raise CommandError(f"--constraint {text!r}: {allowed}")
-    known = {factor.name: k for k, factor in enumerate(factors)}
-    known |= {letter: k for k, letter in enumerate(factor_letters(len(factors)))}
+    known = factor_words(factors)
     name = "|".join(re.escape(one) for one in sorted(known, key=len, reverse=True))
     number = r"\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+"
     term = re.compile(rf"([+\-−]?)\s*(?:({number})\s*(?:\*?\s*({name})(?!\w))?|({name})(?!\w))\s*")

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.analysis.surface import Blocks
+from doe.designs.morris import Morris
 from doe.errors import StudyFileError
 from doe.table_file import CellTable, read_table
 from explorer.design.factors_file import (
@@ -35,6 +36,8 @@ Array = npt.NDArray[np.float64]
 
 EMPTY_CELLS = ("", "NA", "-", "–")
 MOST_BYTES = 10_000_000
+MOST_SEEDS = 2**53
+"""Whole numbers below are exact in a cell."""
 FLAGS = ("yes", "no", "true", "false", "y", "n", "x")
 """What other programs write where they ask whether a run is left out, and not why."""
 HEADER_CELL = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<unit>[^\]]*)\])?$")
@@ -216,6 +219,8 @@ class Runs:
     """The same of groups that are drawn at random."""
     excluded: tuple[tuple[str, str], ...] = ()
     """What each run with a result that is left out is called, and why it is."""
+    others: Array | None = None
+    """Coded levels of the sheet's factors that are left out, of a Morris design, whose steps they bound."""
     grouping: tuple[str, ...] = ()
     """Columns without a use whose cells repeat, as those of days, batches or operators do."""
 
@@ -246,6 +251,7 @@ def runs_of(sheet: Sheet, response: str, only: Sequence[str] = (), block: str = 
     used = np.flatnonzero(~np.isnan(natural).any(axis=1))
     coded = _snapped(region_of(factors).coded(natural[used]))
     rows = _rows(sheet, used, coded)
+    first = [members[0] for members in rows]
     width = max(map(len, rows))
     responses = np.full((len(rows), width), np.nan)
     labels = [[""] * width for _ in rows]
@@ -261,13 +267,14 @@ def runs_of(sheet: Sheet, response: str, only: Sequence[str] = (), block: str = 
         factors=factors,
         response=response,
         unit=sheet.units[response],
-        coded=coded[[members[0] for members in rows]],
+        coded=coded[first],
         responses=responses,
         labels=tuple(map(tuple, labels)),
         missing=sum(map(math.isnan, values)),
         blocks=_blocks(sheet, block, positions, width),
         groups=_blocks(sheet, random, positions, width),
         place=place,
+        others=_others(sheet, factors, used[first]),
         excluded=tuple((_label(sheet, k), sheet.why_excluded(k)) for k in excluded),
         grouping=tuple(
             name for name in sheet.responses if name not in (response, block, random) and _groups(sheet, name)
@@ -275,8 +282,17 @@ def runs_of(sheet: Sheet, response: str, only: Sequence[str] = (), block: str = 
     )
 
 
-def finished_runs(sheet: Sheet, responses: Sequence[str]) -> tuple[Array, tuple[tuple[str, ...], ...]]:
-    """The runs that have a result: coded levels, shape (runs, factors), and the cells of the responses of each.
+@dataclass(frozen=True)
+class FinishedRuns:
+    """The runs of a sheet that have a result: coded levels (runs, factors), responses as cells, seeds (NaN: none)."""
+
+    coded: Array
+    cells: tuple[tuple[str, ...], ...]
+    seeds: Array
+
+
+def finished_runs(sheet: Sheet, responses: Sequence[str]) -> FinishedRuns:
+    """The runs that have a result in one of the responses.
 
     Raises CommandError as `read_sheet` does, and where no run has one.
     """
@@ -291,11 +307,30 @@ def finished_runs(sheet: Sheet, responses: Sequence[str]) -> tuple[Array, tuple[
     natural = np.array([_levels(sheet, sheet.factors, k, needed=True) for k in filled])
     cells = []
     for k in filled:
-        texts = [sheet.cells[k][sheet.columns[name]] if name in known else "" for name in responses]
-        numbers = [sheet.table.number(text) for text in texts]
-        pairs = zip(texts, numbers, strict=True)
-        cells.append(tuple(text if math.isnan(number) else f"{number:.12g}" for text, number in pairs))
-    return _snapped(region_of(sheet.factors).coded(natural)), tuple(cells)
+        numbers = [sheet.number(k, name) if name in known else math.nan for name in responses]
+        cells.append(tuple("" if math.isnan(number) else f"{number:.12g}" for number in numbers))
+    seeds = np.array([_seed(sheet, k) for k in filled])
+    return FinishedRuns(_snapped(region_of(sheet.factors).coded(natural)), tuple(cells), seeds)
+
+
+def _seed(sheet: Sheet, position: int) -> float:
+    """The seed of a run; NaN where the sheet gives none."""
+    seed = sheet.number(position, "seed") if "seed" in sheet.columns else math.nan
+    if not math.isnan(seed) and not (0 <= seed < MOST_SEEDS and seed.is_integer()):
+        raise CommandError(
+            f"{sheet.path}, line {sheet.lines[position]}, column seed: {seed:.12g}; "
+            "allowed: a whole number of at least 0, or an empty cell"
+        )
+    return seed
+
+
+def _others(sheet: Sheet, kept: Sequence[DesignFactor], positions: npt.NDArray[np.int64]) -> Array | None:
+    """Coded levels at positions of the factors of a Morris design that are not kept; None where there are none."""
+    others = tuple(factor for factor in sheet.factors if factor not in kept)
+    if sheet.design != Morris.name or not others:
+        return None
+    natural = np.array([_levels(sheet, others, int(k), needed=False) for k in positions])
+    return _snapped(region_of(others).coded(natural))
 
 
 def _blocks(sheet: Sheet, column: str, rows: Sequence[npt.NDArray[np.int64]], width: int) -> Blocks | None:

@@ -27,7 +27,7 @@ from doe.designs import DESIGNS, Design, DesignOptions, Points
 from doe.errors import StatisticsError
 from explorer.design.choices import Alpha, ModelOrder
 from explorer.design.factors_file import DesignFactor, FactorsFile, coded_constraint, is_number, region_of
-from explorer.design.filled_sheet import finished_runs, read_sheet
+from explorer.design.filled_sheet import FinishedRuns, finished_runs, read_sheet
 from explorer.errors import CommandError
 
 Array = npt.NDArray[np.float64]
@@ -114,12 +114,11 @@ def make_plan(order: DesignOrder, file: FactorsFile) -> RunPlan:
         raise CommandError(f"design {order.design[:40]!r}: allowed are {', '.join(DESIGNS)}")
     design, seed = DESIGNS[order.design], _first(order.seed, file.seed, 1)
     replicates = _first(order.replicates, file.replicates, 1)
-    kept = np.zeros((0, len(file.factors)))
-    finished: tuple[tuple[str, ...], ...] = ()
+    kept = FinishedRuns(np.zeros((0, len(file.factors))), (), np.zeros(0))
     if order.augment is not None:
         if "kept" in design.options and (replicates > 1 or order.blocks):
             raise CommandError("--augment: the finished runs stay as they are; allowed: --replicates 1, no --blocks")
-        kept, finished = finished_runs(read_sheet(order.augment, file.factors), file.responses)
+        kept = finished_runs(read_sheet(order.augment, file.factors), file.responses)
     # Blocks of whole replicates hold every row equally often, in any design.
     of_replicates = order.blocks if order.blocks is not None and replicates % order.blocks == 0 else None
     names = tuple(len(factor.levels) for factor in file.factors)
@@ -137,7 +136,7 @@ def make_plan(order: DesignOrder, file: FactorsFile) -> RunPlan:
         model=(order.model or ModelOrder.QUADRATIC).value,
         constraints=tuple(coded_constraint(text, file.factors) for text in order.constraints),
         levels=names if any(names) and "levels" in design.options else (),
-        kept=tuple(map(tuple, kept.tolist())),
+        kept=tuple(map(tuple, kept.coded.tolist())),
     )
     asked = (*options.given(), *(["model"] if order.model is not None else []))
     _refuse_foreign_options(design, options, asked)
@@ -157,14 +156,24 @@ def make_plan(order: DesignOrder, file: FactorsFile) -> RunPlan:
         block = every[:, 1] * of_replicates // replicates
     else:
         block = points.block[every[:, 0]] if len(points.block) else points.block
-    seeds = _first(file.first_seed, 1) + np.arange(len(every))
+    seeds = _seeds(_first(file.first_seed, 1), len(every), kept.seeds)
     turn = np.arange(len(every)) if order.standard_order else np.random.default_rng(seed).permutation(len(every))
     if len(block):
         turn = turn[np.argsort(block[turn], kind="stable")]
         block = block[turn]
-    if finished:
-        turn = np.concatenate([np.arange(len(finished)), turn[turn >= len(finished)]])
-    return RunPlan(design, points, every[turn], seeds[turn], seed, block, finished)
+    if kept.cells:
+        turn = np.concatenate([np.arange(len(kept.cells)), turn[turn >= len(kept.cells)]])
+    return RunPlan(design, points, every[turn], seeds[turn], seed, block, kept.cells)
+
+
+def _seeds(first: int, runs: int, finished: Array) -> npt.NDArray[np.int64]:
+    """A seed for every run: finished ones, which stand first, keep theirs, and the others count on from the largest."""
+    new = np.append(np.isnan(finished), np.ones(runs - len(finished), dtype=np.bool_))
+    own = finished[~new[: len(finished)]].astype(np.int64)
+    seeds = np.empty(runs, dtype=np.int64)
+    seeds[~new] = own
+    seeds[new] = max(first, own.max(initial=-1) + 1) + np.arange(int(new.sum()))
+    return seeds
 
 
 def _require_parts(file: FactorsFile) -> None:

@@ -53,8 +53,8 @@ class DiagnosisProcess(BackgroundOrders, Protocol):
     def resume(self, question: Question) -> None:
         """Go on with the newest one of its data that was stopped. Raises a ValueError where there is none."""
 
-    def resumable(self, question: Question) -> bool:
-        """Whether :meth:`resume` has something to go on with."""
+    def stopped(self, question: Question) -> Path | None:
+        """The folder that :meth:`resume` goes on in, None where there is nothing to go on with."""
 
 
 class DiagnoseProcess(OrderedCommands[Question]):
@@ -94,17 +94,15 @@ class DiagnoseProcess(OrderedCommands[Question]):
         """
         checked = _checked(question)
         self._process.refuse_while_running()
-        found = self._unfinished(checked)
-        if found is None:
+        out = self.stopped(checked)
+        if out is None:
             raise BackgroundError(f"no diagnosis of {Path(checked.data).name} has been stopped before its end")
-        self._go_on_in(found[0], self._arguments(checked, found[0]))
+        self._go_on_in(out, self._arguments(checked, out))
 
-    def resumable(self, question: Question) -> bool:
-        """Whether a diagnosis of these data was stopped before its end."""
-        return self._unfinished(question) is not None
-
-    def _unfinished(self, question: Question) -> tuple[Path, str] | None:
-        return newest_unfinished(self._folder, (Path(question.data).name,), RESULT)
+    def stopped(self, question: Question) -> Path | None:
+        """Folder of the newest diagnosis of these data that was stopped before its end; None where none was."""
+        found = newest_unfinished(self._folder, (Path(question.data).name,), RESULT)
+        return None if found is None else found[0]
 
     def _begin(self, question: Question) -> None:
         # One that goes on from another is not resumed by its data's name; asked again, it finds its pours in the store.

@@ -67,6 +67,8 @@ class DeckMesh:
     """Corners [m], shape (t, 3, 3)."""
     until_step: int = -1
     """The wall is taken away when this many steps are done; −1: never."""
+    of_file: bool = False
+    """Whether the triangles are those of a mesh file, and not of a polygon of ``SIDES`` corners."""
 
 
 @dataclass(frozen=True)
@@ -288,7 +290,7 @@ def _meshes(scene: Scene, record: Record) -> tuple[DeckMesh, ...]:
         if isinstance(surface, Plane) or (name == "gate" and not gated):
             continue
         triangles = revolved_triangles(surface) if isinstance(surface, Revolved) else mesh_triangles(surface)
-        meshes.append(DeckMesh(name, triangles, opening if name == "gate" else -1))
+        meshes.append(DeckMesh(name, triangles, opening if name == "gate" else -1, isinstance(surface, TriangleMesh)))
     return tuple(meshes)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from pathlib import Path
 
-from explorer.export.deck import Deck
+from explorer.export.deck import SIDES, Deck
 from solver.laws import HertzMindlin
 
 RUN = {
@@ -64,6 +64,8 @@ CONVENTIONS = {
         static friction   law.json holds the angle, atan mu; Coulomb, |F_t| <= mu F_n: as here
 {COMMON}""",
 }
+POLYGON = f"The cone is a polygon of the same area with {SIDES} sides"
+OF_FILE = "The cone has the triangles of its mesh file, as here"
 NO_ROLLING = "none: nothing resists rolling, here or there"
 EPSD2 = "{mu:g}, epsd2: a spring k_t R*^2, torque up to mu_r R* F_n, as here; elsewhere the number means something else"
 TEXT = """\
@@ -90,7 +92,7 @@ Conventions
 
 Not as in explorer
 {differences}
-    The cone is a polygon of the same area with 96 sides; bodies that roll far away stay in the calculation.
+    {cone}; bodies that roll far away stay in the calculation.
 """
 
 
@@ -107,6 +109,7 @@ def write_readme(folder: Path, engine: str, deck: Deck) -> None:
         run=_block(RUN[engine]),
         files=_block(FILES[engine]),
         conventions=_block(CONVENTIONS[engine].format(rolling=_rolling(deck.rolling_friction))),
+        cone=OF_FILE if any(mesh.of_file for mesh in deck.meshes) else POLYGON,
         differences=_block(_differences(engine, deck)),
         plate="" if deck.plate is None else f" z = {deck.plate:g} m",
     )

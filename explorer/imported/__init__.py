@@ -41,8 +41,6 @@ def write_imported(folder: Path, name: str, program: str, file: Path) -> tuple[P
         found = READERS[program](file)
     except OSError as error:
         raise CommandError(f"{file}: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise CommandError(f"{file}: is not text") from None
     if not found.materials:
         raise CommandError(f"{file}: says no material in {program}'s words; needed: {NEEDED[program]}")
     try:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from explorer.errors import CommandError
-from explorer.imported.found import Found, grains, one_rolling
+from explorer.imported.found import Found, grains, one_rolling, text_of
 from solver import ParameterError
 from solver.params import parse_quantity
 
@@ -63,9 +63,9 @@ def read_edem(file: Path) -> Found:
             else:
                 _edem_numbers(path, found, rolling, material_of, table)
     poured = [body["material"] for body in found.bodies.values()] or grains(found)
-    if rolling["rolling_here"] and any(rolling["rolling_here"].values()):
+    if poured and any(rolling["rolling_here"].values()):
         one_rolling(found, rolling["rolling_here"], poured)
-    elif any(rolling["rolling"].values()):
+    elif poured and any(rolling["rolling"].values()):
         one_rolling(found, rolling["rolling"], poured)
         found.notes.append(
             "rolling friction: there a constant torque mu_r F_n R_i with the arm to the centre, here a spring with the "
@@ -87,11 +87,16 @@ def read_edem(file: Path) -> Found:
 
 
 def _tables(path: Path) -> list[Rows]:
-    """The tables of a text: comma, semicolon or tab between cells; a row with EDEM's names begins another one."""
+    """The tables of a text; a row with EDEM's names begins another one.
+
+    Between cells is a comma, or a semicolon or a tab; beside these a comma in a number is its decimal sign.
+    """
     found: list[Rows] = []
-    for line in path.read_text(encoding="utf-8-sig").splitlines():
+    for line in text_of(path).splitlines():
         mark = next((mark for mark in "\t;," if mark in line), ",")
         row = [cell.strip() for cell in next(csv.reader([line], delimiter=mark), [])]
+        if mark != ",":
+            row = [re.sub(r"(?<=\d),(?=\d)", ".", cell) for cell in row]
         columns = [_column(cell) for cell in row]
         if any(key in EDEM_KEYS for key, _ in columns) or columns[:2] == [("body", ""), ("material", "")]:
             found.append(Rows(columns))

@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
+from doe.table_file import decoded
+from explorer.errors import CommandError
 from explorer.scene.starter_files import starter_scene
 from solver import Scene
 from solver.laws.restitution import exponent
@@ -79,7 +81,10 @@ def scene_of(found: Found, path: Path) -> Scene:
 def grains(found: Found) -> list[str]:
     """Materials of bodies where a file names none: all but the wall, which is the last where nothing says else."""
     names = list(found.materials)
-    return [name for name in names if name != found.wall] if found.wall else names[: max(1, len(names) - 1)]
+    if not found.wall:
+        return names[: max(1, len(names) - 1)]
+    # Where there is one material only, the wall is made of it as well.
+    return [name for name in names if name != found.wall] or names
 
 
 def restitution_of(zeta: float) -> float:
@@ -93,6 +98,14 @@ def one_rolling(found: Found, rolling: Mapping[frozenset[str], float], poured: I
     if len(set(rolling.values())) > 1:
         every = ", ".join(f"{' and '.join(sorted(pair))} {value:g}" for pair, value in rolling.items())
         found.notes.append(f"rolling friction: one number here for all contacts, {found.rolling:g}; there {every}")
+
+
+def text_of(file: Path) -> str:
+    """The text of an input, in whatever characters it was saved."""
+    text = decoded(file.read_bytes())
+    if text is None:
+        raise CommandError(f"{file}: is not text")
+    return text
 
 
 # Arithmetic without running anything.

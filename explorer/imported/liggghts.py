@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from explorer.errors import CommandError
-from explorer.imported.found import Found, number, one_rolling, restitution_of
+from explorer.imported.found import Found, number, one_rolling, restitution_of, text_of
 from solver.laws import HertzMindlin, LinearSpringDashpot
 
 LAWS = {"hertz": HertzMindlin.name, "hooke": LinearSpringDashpot.name}
@@ -37,7 +37,7 @@ def read_liggghts(file: Path) -> Found:
     shares: list[tuple[str, list[str]]] = []
     model: list[str] = []
     walls: list[str] = []
-    for line in _commands(file.read_text(encoding="utf-8"), names):
+    for line in _commands(text_of(file), names):
         match line:
             case ["units", unit, *_] if unit != "si":
                 raise CommandError(f"{file}: units {unit}; allowed: si")
@@ -158,7 +158,10 @@ def _spheres(file: Path, where: str, after: Callable[[str, int], list[str]]) -> 
     """Rows x, y, z, r of a clump, in the script or in a file beside it."""
     texts, scale = after("spheres", 2), 1.0
     if texts[:1] == ["file"]:
-        texts = (file.parent / texts[1]).read_text(encoding="utf-8").split()
+        try:
+            texts = text_of(file.parent / texts[1]).split()
+        except OSError as error:
+            raise CommandError(f"{file}: {where}: spheres file {texts[1]}: {error.strerror}") from None
         scale = _float(file, where, (after("scale", 1) or ["1"])[0])
     else:
         texts = after("spheres", 4 * int(_float(file, where, (after("nspheres", 1) or ["0"])[0])))

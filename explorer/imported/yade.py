@@ -17,12 +17,12 @@ from explorer.errors import CommandError
 from explorer.export.deck import FILE as DECK
 from explorer.export.deck import read_deck
 from explorer.export.yade import LAW
-from explorer.imported.found import Found, Numbers, called, number, restitution_of
+from explorer.imported.found import Found, Numbers, called, number, restitution_of, text_of
 
 
 def read_yade(file: Path) -> Found:
     """What the calls in a YADE script say: FrictMat, sphere, the Ip2 functor. Of an exported deck: its tables."""
-    text = file.read_text(encoding="utf-8")
+    text = text_of(file)
     if DECK in text and (file.parent / DECK).is_file() and (file.parent / LAW).is_file():
         return _deck(file.parent)
     try:

@@ -22,7 +22,7 @@ from explorer.files.uploads import kept_file
 from explorer.scene.source import SceneSource, material_source
 from explorer.scene.starter_files import new_path, starter_scene, write_new
 from explorer.scene.text import material_toml, toml_key, toml_value
-from solver import ParameterError, Scene, asset_path, load_material, read_toml, with_values
+from solver import ParameterError, Scene, asset_path, load_material, parse_quantity, read_toml, with_values
 from solver.toml_file import Number, Scalar, TomlTable, checked
 
 Table = dict[str, Any]
@@ -169,7 +169,9 @@ def _of_material(scene: Scene, name: str, entry: Table) -> dict[str, Any]:
     if "shear_modulus" in entry:
         shear = _number(entry["shear_modulus"], f"materials.{name}.shear_modulus")
         return settings | {f"material.{name}.poisson_ratio": young / (2.0 * shear) - 1.0}
-    ratio = float(entry.get("poisson_ratio", scene.material(name).poisson_ratio))
+    ratio = parse_quantity(
+        entry.get("poisson_ratio", scene.material(name).poisson_ratio), "1", f"materials.{name}.poisson_ratio"
+    )
     return settings | {f"material.{name}.shear_modulus": young / (2.0 * (1.0 + ratio))}
 
 

@@ -149,7 +149,7 @@ class LivePour:
         state = SessionState.RUNNING
         if pour.outcome != Outcome.RUNNING:
             state = SessionState.ENDED
-        elif self._paused:
+        elif self._stepped:
             state = SessionState.PAUSED
         sample = self._sample()
         return Status(
@@ -279,7 +279,7 @@ class LivePour:
 
     @property
     def _stepped(self) -> bool:
-        """Whether the end of a step of the person at the screen is reached."""
+        """Whether it stands still: paused, and the end of a step of the person at the screen is reached."""
         return self._paused and self._pour.time >= self._run_until
 
     def _steps_to_stop(self) -> int:

@@ -146,6 +146,7 @@ def _added(folder: Path, asked: NewCondition, brought: Brought) -> WrittenCondit
         )
         text = _with_uncertainty(text, asked, folder)
         files = [*_write_data(staged, asked.name, found), staged / FILE]
+        _check_new(folder, asked.name, [file.relative_to(staged) for file in files[:-1]])
         write_whole(files[-1], text)
         measurement = _loaded(staged, folder)
         held = _to_hold_out(measurement) if asked.role is None else None
@@ -194,19 +195,30 @@ def _of_study(file: Path) -> tuple[dict[str, Any], list[str]]:
 
 def _starter_ranges(scene: Scene, material: str) -> dict[str, Any]:
     """[parameters] as a starter study has factors; mean and sd where the material's file says they were measured."""
-    measured, declared = read_toml(asset_path("materials", material)).get("measured", {}), parameters(scene)
+    file, declared = asset_path("materials", material), parameters(scene)
+    measured = read_toml(file).get("measured", {})
     free: dict[str, Any] = {}
     for path in factor_paths(scene):
         here: Any = measured
-        for key in path.replace("material.", "materials.", 1).split("."):
+        place = path.replace("material.", "materials.", 1)
+        for key in place.split("."):
             here = here.get(key) if isinstance(here, Mapping) else None
-        if isinstance(here, Mapping) and here.get("sd", 0.0) > 0.0:
-            free[path] = {"mean": float(here["value"]), "sd": float(here["sd"])}
-            continue
+        if isinstance(here, Mapping) and "sd" in here:
+            mean, sd = (_measured(f"{file}: measured.{place}.{key}", here.get(key)) for key in ("value", "sd"))
+            if sd > 0.0:
+                free[path] = {"mean": mean, "sd": sd}
+                continue
         reference, known = float(value(scene, path)), declared[path]
         low, high = max(known.low, (1.0 - SPAN) * reference), min(known.high, (1.0 + SPAN) * reference)
         free[path] = {"low": float(f"{low:.6g}"), "high": float(f"{high:.6g}")}
     return free
+
+
+def _measured(where: str, given: Any) -> float:
+    if isinstance(given, bool) or not isinstance(given, int | float) or not math.isfinite(given):
+        said = "missing, with an sd beside it" if given is None else repr(given)
+        raise CommandError(f"{where}: {said}; allowed: a number in SI")
+    return float(given)
 
 
 def _entry(
@@ -278,6 +290,14 @@ def _write_data(folder: Path, condition: str, found: Readings) -> list[Path]:
             (folder / kept).mkdir(exist_ok=True)
             written.append(Path(shutil.copyfile(file, folder / kept / name)))
     return written
+
+
+def _check_new(folder: Path, condition: str, files: Sequence[Path]) -> None:
+    for file in files:
+        if (folder / file).exists():
+            raise CommandError(
+                f"--condition {condition}: {folder / file} is there already; allowed: a name whose files are not"
+            )
 
 
 def _moved(files: Sequence[Path], made: Path, folder: Path) -> tuple[Path, ...]:

@@ -24,7 +24,7 @@ import numpy.typing as npt
 from doe.laboratory import analyse
 from doe.measurement.photographs import HEIGHT
 from doe.measurement.scans import ARRAYS, POINTS, SURFACES, Scan, ScanSettings, read_scan
-from doe.table_file import read_table
+from doe.table_file import check_cells, read_table
 from explorer.errors import CommandError
 from explorer.measured.balance import MOST_BYTES, BalanceCurve, read_balance
 from explorer.units import fixed
@@ -220,6 +220,7 @@ def _angles(text: str) -> list[float]:
         return _checked_angles(values, f"--angles {text}")
     path, column = _named_part(text)
     table = read_table(path, MOST_BYTES, CommandError, ":{}", comments=True)
+    check_cells(table, lambda line, what: CommandError(f"--angles {path}:{line}: {what}"))
     (line, header), *rows = table.rows or ((1, []),)
     if not column and len(header) == 1:
         column = header[0]
@@ -229,8 +230,7 @@ def _angles(text: str) -> list[float]:
             f"{', '.join(header)[:100]}"
         )
     place = header.index(column)
-    cells = [cells[place] if place < len(cells) else "" for _, cells in rows]
-    return _checked_angles([table.number(cell) for cell in cells], f"--angles {path}: {column}")
+    return _checked_angles([table.number(cells[place]) for _, cells in rows], f"--angles {path}: {column}")
 
 
 def _checked_angles(values: list[float], where: str) -> list[float]:
@@ -272,10 +272,16 @@ def _balances(brought: Brought, scene: Scene, found: Readings) -> None:
         )
     starts = brought.starts if len(brought.starts) == len(curves) else brought.starts * len(curves)
     for curve, start in zip(curves, starts, strict=True):
-        if not curve.time[0] <= start < curve.share_time(0.1, poured):
+        tenth = curve.share_time(0.1, poured)
+        if not curve.time[0] <= start < tenth:
             raise CommandError(
-                f"--starts {start:g}: allowed: from {curve.time[0]:g} s, where {curve.name} begins, to "
-                f"{curve.share_time(0.1, poured):.4g} s, where a tenth has passed"
+                f"--starts {start:g}: allowed: from {curve.time[0]:g} s, where {curve.name} begins, to {tenth:.4g} s, "
+                "where a tenth has passed"
+            )
+        if not start + lag < tenth:
+            raise CommandError(
+                f"--lag {lag:g}: allowed: below {tenth - start:.4g} s, from the start to where a tenth of {curve.name} "
+                "has passed"
             )
     for name, values in times.items():
         found.add(name, [value - start - lag for value, start in zip(values, starts, strict=True)])

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
+from datetime import date, time
 from pathlib import Path
 from typing import Any
 
@@ -192,4 +193,6 @@ def toml_value(entry: Any) -> str:
         return "true" if entry else "false"
     if isinstance(entry, int):
         return str(entry)
+    if isinstance(entry, date | time):
+        return entry.isoformat()
     return repr(float(entry))

@@ -49,7 +49,7 @@ class StudyProcess(BackgroundOrders, Protocol):
         """Start it after those before it; at once if none runs and none waits."""
 
     def resume(self) -> None:
-        """Go on with the study started last, also before this page. Raises BackgroundError where there is none."""
+        """Go on with the study stopped last, also before this page. Raises BackgroundError where there is none."""
 
     def resumable(self) -> bool:
         """Whether :meth:`resume` has something to go on with."""
@@ -115,30 +115,32 @@ class CalibrationProcess(OrderedCommands[QueuedStudy]):
         self._add(self._order(profile, edits))
 
     def resume(self) -> None:
-        """Go on where the last calibration was stopped, be it one of an earlier session of the page.
+        """Go on where a calibration was stopped last, be it one of an earlier session of the page.
 
         Runs that are in the store are not repeated.
         """
         self._process.refuse_while_running()
-        out = self._last()
+        found = self._stopped()
+        if found is None:
+            raise BackgroundError("no study has been stopped before its end; there is nothing to resume")
+        out, profile = found
+        if out != self._process.out:
+            self._profile, self._tries, self.present = profile, TRIES, None
         self._go_on_in(out, self._arguments(out))
 
     def resumable(self) -> bool:
-        """Whether the last one was stopped, in this session of the page or before."""
-        if self.status().state in ("cancelled", "failed"):
-            return True
+        """Whether one was stopped before its end, in this session of the page or before."""
         try:
-            return self._unfinished() is not None
+            return self._stopped() is not None
         except ValueError:  # the study's file cannot be read, which is told where one is started
             return False
 
     def retry(self) -> None:
         """Run the last calibration again, with more seeds for replicates that are left without a valid run."""
         self._process.refuse_while_running()
-        lost = given_up(self.status().tried, self._tries)
-        if not lost and self.status().state != "failed":
+        out, last = self._process.out, self._process.status()
+        if out is None or (last.state != "failed" and not given_up(last.tried, self._tries)):
             raise BackgroundError("nothing to try again: every replicate of the last study has a valid run")
-        out = self._last()
         self._tries += TRIES
         self._go_on_in(out, self._arguments(out))
 
@@ -166,14 +168,10 @@ class CalibrationProcess(OrderedCommands[QueuedStudy]):
         """Its profile, and whether the study was changed."""
         return f"{order.profile}{', changed' if order.text else ''}"
 
-    def _last(self) -> Path:
+    def _stopped(self) -> tuple[Path, str] | None:
+        """Folder and profile of the last study where it was stopped before its end, else as :meth:`_unfinished`."""
         out = self._process.out
-        if out is None:
-            found = self._unfinished()
-            if found is None:
-                raise BackgroundError("no study has been stopped before its end; there is nothing to resume")
-            (out, self._profile), self.present = found, None
-        return out
+        return (out, self._profile) if out is not None and not (out / RESULT).exists() else self._unfinished()
 
     def _unfinished(self) -> tuple[Path, str] | None:
         """Folder and profile of the newest study of the page's file that was stopped before its end."""

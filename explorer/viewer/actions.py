@@ -46,11 +46,14 @@ class Actions:
             try:
                 action()
                 notice = notice or ""
-            except ValueError as error:
-                notice = str(error)
-            except OSError as error:  # a full disk, a folder that may not be written to
-                notice = f"{error.filename or 'file'}: {error.strerror or error}"
+            except (ValueError, OSError) as error:
+                notice = refusal(error)
         return notice
+
+
+def refusal(error: ValueError | OSError) -> str:
+    """The line of what was refused, by us or by the machine: a full disk, a folder that may not be written to."""
+    return f"{error.filename or 'file'}: {error.strerror or error}" if isinstance(error, OSError) else str(error)
 
 
 class FrameClock:

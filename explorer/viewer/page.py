@@ -30,7 +30,7 @@ from explorer.live.session import Session
 from explorer.project.project import Project
 from explorer.scene.presets import data_folder
 from explorer.study.process import StudyProcess
-from explorer.viewer.actions import Actions, FrameClock
+from explorer.viewer.actions import Actions, FrameClock, refusal
 from explorer.viewer.guarded_server import GuardedServer
 from explorer.viewer.output.recording_switch import Recorder
 from explorer.viewer.panel import OFTEN, SELDOM, TABS, Now, PageContext, Panel, Place
@@ -134,12 +134,20 @@ class Page:
             preview = None if frame is not None else self._previewed(status)
             if frame is not None:
                 # Before it is drawn: a playback keeps the messages to browsers, and the time between them.
-                for recorder in (*self._recorders, self._context.recording):
-                    recorder.take(frame, status)
+                self._record(frame, status)
             with self._server.atomic():
                 now = Now(status, frame or preview, self._events, self._notice, preview is not None)
                 self._show(now, notice is not None or bool(happened))
             frames.wait(stop)
+
+    def _record(self, frame: Frame, status: Status) -> None:
+        """Hand on what is shown; a recorder that cannot go on, with its folder gone, is told and left out."""
+        for recorder in (*self._recorders, self._context.recording):
+            try:
+                recorder.take(frame, status)
+            except (ValueError, OSError) as error:
+                self._notice = f"the recording has ended: {refusal(error)}"
+                self._recorders = tuple(one for one in self._recorders if one is not recorder)
 
     def _previewed(self, status: Status) -> Frame | None:
         """A frame of the recording of this very pour, while the solver loads."""

@@ -110,17 +110,27 @@ class Batch:
 
     def load(self, w: int, scene: Scene, bodies: BodyTables, dt: float, active: Sequence[bool]) -> None:
         """Empty world ``w`` and set it up for ``scene``; no body has entered yet. ``active``: one per surface."""
-        s = self._s
-        for name, needed in (("bodies", len(bodies.numbers)), ("members", len(bodies.spheres))):
-            if needed > getattr(self.capacity, name):
-                raise ValueError(f"{needed} {name} do not fit into a batch of {getattr(self.capacity, name)}")
+        s, walls = self._s, wall_tables(scene.rig.surfaces())
+        needed = {
+            "bodies": len(bodies.numbers),
+            "members": len(bodies.spheres),
+            "kinds": len(scene.bodies) + len(wall_materials(scene)),
+            "walls": len(walls.poses),
+            "surfaces": len(walls.surfaces),
+            "triangles": len(walls.corners),
+            "cells": len(walls.first),
+            "cell_items": len(walls.items),
+        }
+        for name, number in needed.items():
+            if number > getattr(self.capacity, name):
+                raise ValueError(f"{number} {name} do not fit into a batch of {getattr(self.capacity, name)}")
         if scene.contact.shares and not self.capacity.sharing:
             raise ValueError("contact.clump_rule: the batch was made for rules by which contacts do not share")
         if scene.contact.law != self.capacity.law:
             raise ValueError(f"contact.law: the batch was made for {self.capacity.law}, not for {scene.contact.law}")
         transfer.load_world(s, w, transfer.Settings(**settings_of(scene, bodies, dt)))
         transfer.load_bodies(s, w, bodies.numbers, bodies.places, bodies.spheres, bodies.owner)
-        self._load_walls(w, scene, wall_tables(scene.rig.surfaces()), active)
+        self._load_walls(w, scene, walls, active)
         self._scenes[w] = scene
         self.set_law(w, law_table(scene))
         self.set_effects(w, scene)

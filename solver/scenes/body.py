@@ -190,10 +190,20 @@ def counts(bodies: tuple[Body, ...], mass: float) -> tuple[int, ...]:
 
 
 def _with_fraction(bodies: tuple[Body, ...], name: str, new: float) -> tuple[Body, ...]:
+    """The other shares scale with it; where they are all zero, they share the rest equally."""
+    if len(bodies) == 1 and new != 1.0:
+        raise ParameterError(f"body.{name}.mass_fraction: {new:g}, but there is no other component; allowed: 1")
     others = sum(body.mass_fraction for body in bodies if body.name != name)
-    scale = (1.0 - new) / others if others > 0 else 0.0
+    rest = 1.0 - new
     return tuple(
-        dataclasses.replace(body, mass_fraction=new if body.name == name else body.mass_fraction * scale)
+        dataclasses.replace(
+            body,
+            mass_fraction=new
+            if body.name == name
+            else body.mass_fraction * (rest / others)
+            if others > 0
+            else rest / (len(bodies) - 1),
+        )
         for body in bodies
     )
 

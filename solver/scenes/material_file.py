@@ -19,6 +19,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -216,11 +217,18 @@ def scene_from(table: dict[str, Any], path: Path) -> Scene:
         raise ParameterError(f"body.*.mass_fraction: add up to {total:g}, not to 1")
     if len({body.name for body in bodies}) < len(bodies):
         raise ParameterError("body.name: two bodies share a name")
+    pairs = tuple(_pairs(file.pair))
+    touching = [*(one.name for one in materials), *(one.name for one in bodies)]
+    for pair in pairs:
+        for name in (pair.a, pair.b):
+            if name not in touching:
+                known = ", ".join(dict.fromkeys(touching))
+                raise ParameterError(f"pair.{pair.a}.{pair.b}: no material or body {name!r}; known: {known}")
     scene = Scene(
         title=file.title or file.name or path.stem,
         materials=materials,
         bodies=bodies,
-        pairs=tuple(_pairs(file.pair)),
+        pairs=pairs,
         rig=Funnel(wall=_wall(file.wall, materials, bodies)),
         contact=ContactModel(law=law),
         gravity=file.gravity,
@@ -403,6 +411,9 @@ def measured_spread(table: SizeTable, where: str) -> float:
     if (table.mean is None) != (table.sd is None):
         raise ParameterError(f"{where}: mean and sd are needed together")
     percents = {_percent(name, where): diameter for name, diameter in table.quantiles.items()}
+    rising = [percents[percent] for percent in sorted(percents)]
+    if any(low >= high for low, high in pairwise(rising)):
+        raise ParameterError(f"{where}.quantiles: {rising} m; allowed: larger diameters for larger percentages")
     if table.mean is not None and table.sd is not None:
         return table.sd / table.mean
     if len(percents) < 2:

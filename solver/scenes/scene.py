@@ -18,6 +18,7 @@ A scene is the declared one; :func:`actual` carries out its effects of material 
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -29,6 +30,9 @@ from solver.scenes.contact_model import ContactModel
 from solver.scenes.insertion import Insertion
 from solver.scenes.material import Material, Pair
 from solver.scenes.numerics import Numerics
+
+MOST_GRAVITY = 1e4
+"""[m/s²], a thousand times that of the earth, as in a centrifuge."""
 
 
 @dataclass(frozen=True)
@@ -204,9 +208,15 @@ def check(scene: Scene) -> None:
         for other in scene.bodies:
             scene.contact_pair(body, other)
     scene.material(scene.rig.wall)
+    _check_gravity(scene)
     scene.rig.check(widest_body=max(sorted(body.largest_extents)[1] for body in scene.bodies))
     if scene.rig.name in RIGS:
         rig = pour_rig(scene)
+        if rig.domain_half_width <= (radius := rig.container(0.0).radius) < math.inf:
+            raise ParameterError(
+                f"rig.domain_half_width: {rig.domain_half_width:g} m is within the {rig.name}; allowed: more than "
+                f"{radius:g} m"
+            )
         if scene.insertion.protocol not in rig.protocols:
             allowed = ", ".join(rig.protocols)
             raise ParameterError(f"insertion.protocol: {scene.insertion.protocol!r} is not {allowed} in a {rig.name}")
@@ -218,6 +228,15 @@ def check(scene: Scene) -> None:
             )
         _check_duration(rig, scene.numerics)
         rig.feed().check(scene.insertion.region_radius, longest)
+
+
+def _check_gravity(scene: Scene) -> None:
+    """In a rig, bodies fall."""
+    in_rig = scene.rig.name in RIGS or scene.rig.name in BENCH_RIGS
+    if in_rig and not (scene.gravity[2] < 0.0 and math.hypot(*scene.gravity) <= MOST_GRAVITY):
+        raise ParameterError(
+            f"gravity: {list(scene.gravity)} m/s2; allowed: down (third number below 0), up to {MOST_GRAVITY:g} m/s2"
+        )
 
 
 def actual(scene: Scene) -> Scene:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from solver import backend
 from solver.params import ParameterError
-from solver.scenes.scene import Scene
+from solver.scenes.scene import Scene, actual
 from solver.single_body import compression, drop_plate_45, inclined_plane
 from solver.single_body.bench import BenchResult, Quantity
 
@@ -24,8 +24,11 @@ __all__ = ["BENCH_TESTS", "BenchResult", "Quantity", "run_bench_test"]
 
 
 def run_bench_test(scene: Scene, seed: int = 1) -> BenchResult:
-    """Run the bench test that is the rig of ``scene``; ``seed`` draws the orientations where some are drawn."""
+    """Run the bench test that is the rig of ``scene``, as it is after its set-up effects.
+
+    ``seed`` draws the orientations where some are drawn.
+    """
     if scene.rig.name not in BENCH_TESTS:
         raise ParameterError(f"rig.name: {scene.rig.name!r} is no bench test; known: {', '.join(BENCH_TESTS)}")
     backend.init(threads=1)
-    return BENCH_TESTS[scene.rig.name](scene, seed)
+    return BENCH_TESTS[scene.rig.name](actual(scene), seed)

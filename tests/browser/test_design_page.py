@@ -59,7 +59,7 @@ def test_a_sheet_is_taken_along_filled_and_analysed(page, tmp_path):
     seen(page, "--centre 3 --alpha face-centred --decimal-comma")
     shot(page, "design_sheet")
     with page.expect_download() as taken:
-        press(page, "Take the files along")
+        press(page, "Download the files")
     lines = taken.value.path().read_text(encoding="utf-8-sig").splitlines()
     head = next(k for k, line in enumerate(lines) if line.startswith("row;"))
     runs = lines[head + 1 :]

@@ -6,7 +6,7 @@ import re
 import openpyxl
 import pytest
 
-from doe.table_file import csv_table, read_table, read_text
+from doe.table_file import check_cells, csv_table, read_table, read_text
 
 
 def table(text, **more):
@@ -27,6 +27,19 @@ def test_a_comma_is_no_decimal_sign_where_it_stands_between_cells():
     found = table('name,x\na,"1,5"\n')
     assert found.rows[1] == (2, ["a", "1,5"])
     assert math.isnan(found.number("1,5"))
+
+
+def test_below_a_header_of_one_name_a_comma_is_decimal():
+    found = table("angle_deg\n24,1\n25.3\n")
+    assert found.rows == ((1, ["angle_deg"]), (2, ["24,1"]), (3, ["25.3"]))
+    assert [found.number(cells[0]) for _, cells in found.rows[1:]] == [24.1, 25.3]
+
+
+def test_a_row_with_another_number_of_cells_than_the_header_is_named():
+    check_cells(table("x,y\n1,2\n3,\n"), AssertionError)
+    for row, count in (("6,1,40", 3), ("6", 1)):
+        with pytest.raises(ValueError, match=f"^line 3: {count} cells; allowed: 2, one per column"):
+            check_cells(table(f"x,y\n1,2\n{row}\n"), lambda line, what: ValueError(f"line {line}: {what}"))
 
 
 @pytest.mark.parametrize("text", ["", "steep", "nan", "inf", "1_000", "1.234,5", "1,2,3", "1e999", "0x10"])

@@ -1,4 +1,4 @@
-"""An answer on the page: the terminal's text, a picture, charts, the line that repeats it, files to take along."""
+"""An answer on the page: the terminal's text, a picture, charts, the line that repeats it, files to download."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class AnswerView:
         self._picture: Any = None
         self._plots = PlotView(server, "Chart of it", NO_CHARTS, post) if charts else None
         self._take = server.gui.add_button(
-            "Take the files along", disabled=True, hint="What the command would have written, as files of this browser."
+            "Download the files", disabled=True, hint="The files that the command line would write."
         )
 
         @self._take.on_click

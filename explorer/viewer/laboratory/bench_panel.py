@@ -66,7 +66,7 @@ class BenchPanel(Panel):
         self._bias = gui.add_checkbox(
             "Where the formula misses",
             False,
-            hint="What the test's usual formula gives over a range of what was put in.",
+            hint="Compares the result of the usual formula with known inputs over a range.",
         )
         evaluate = gui.add_button("Evaluate", hint="Mean, spread, interval, normality, outliers, parameters.")
         pour = gui.add_button(

@@ -15,7 +15,7 @@ from explorer.design.run_plan import DesignOrder
 from explorer.errors import CommandError
 from explorer.laboratory.command_results import CommandResult, SheetOrder, sheet_result
 from explorer.viewer.laboratory.answer_view import AnswerView
-from explorer.viewer.laboratory.inputs import UploadSlot, number_or_none, parts_of, whole_or_none
+from explorer.viewer.laboratory.inputs import UploadSlot, in_labels, number_or_none, parts_of, whole_or_none
 from explorer.viewer.output.send_file import send_file
 from explorer.viewer.panel import LABORATORY, PageContext, Panel
 from explorer.viewer.view import small_html
@@ -43,6 +43,19 @@ NUMBERS = {
     "seed": ("Seed", "Of the order of the runs, and of designs that are drawn; empty: as the file says, else 1."),
 }
 """Field of a :class:`DesignOrder` that is a whole number → its label and hint."""
+LABELS = {f"--{name}": label for name, (label, _) in NUMBERS.items()} | {
+    "--generator": "Generators",
+    "--nonregular": "Nonregular",
+    "--fold": "Fold over",
+    "--alpha": "Axial points",
+    "--model": "Model",
+    "--constraint": "Constraints",
+    "--augment": "Finished runs",
+    "--standard-order": "Standard order",
+    "--sigma": "Standard deviation of a run",
+    "--effect": "Change to be seen",
+}
+"""Option of the command line → label of its field."""
 ANY_DESIGN = ("blocks", "replicates", "seed")
 """Of these, what every design takes."""
 NOTHING_KEPT = "none"
@@ -103,12 +116,12 @@ class DesignPanel(Panel):
         self._sigma = gui.add_text(
             "Standard deviation of a run",
             "",
-            hint="In the response's unit; empty: unknown. Which changes will be seen?",
+            hint="In the response's unit; empty: unknown. Gives the smallest change that can be detected.",
         )
         self._effect = gui.add_text(
             "Change to be seen",
             "",
-            hint="In the response's unit, or in standard deviations of a run. With which chance?",
+            hint="In the response's unit, or in standard deviations of a run. Gives the power to detect it.",
         )
         self._format = gui.add_dropdown(
             "Sheet as", FORMATS, hint="What spreadsheets open; many languages write 0,5 for 0.5."
@@ -123,7 +136,9 @@ class DesignPanel(Panel):
             "kept": self._kept,
         }
         self._follow()
-        make = gui.add_button("Make the sheet", hint="Says what is confused with what, and what it will see.")
+        make = gui.add_button(
+            "Make the sheet", hint="Lists which effects are aliased, and how small a change the design can detect."
+        )
         self.view = AnswerView(server, SHEET, post)
         self._kind.on_update(lambda event: post(self._follow) if event.client_id is not None else None)
         make.on_click(lambda _: post(self._make))
@@ -184,7 +199,7 @@ class DesignPanel(Panel):
             workbook=self._format.value == WORKBOOK_FILE,
             decimal_comma=self._format.value == COMMA_TABLE,
         )
-        self._background.start("making the sheet", lambda: sheet_result(order, asked), self._made)
+        self._background.start("making the sheet", in_labels(lambda: sheet_result(order, asked), LABELS), self._made)
 
     def _made(self, answer: CommandResult) -> None:
         """Show the answer; its sheet is the one that is filled in and analysed from now on."""

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import viser
 
 from explorer.errors import CommandError
 from explorer.files.uploads import kept_file
 from explorer.viewer.actions import Post, on_upload
+
+OPTION = re.compile(r"--[a-z][a-z-]*")
+Found = TypeVar("Found")
 
 
 class UploadSlot:
@@ -112,6 +116,18 @@ def whole_or_none(text: str, what: str, least: int, most: int | None) -> int | N
         allowed = f"{least} … {most}" if most is not None else f"{least} and more"
         raise CommandError(f"{what} {text.strip()[:40]!r}: allowed is a whole number, {allowed}, or nothing")
     return int(number)
+
+
+def in_labels(work: Callable[[], Found], labels: Mapping[str, str]) -> Callable[[], Found]:
+    """``work`` whose refusals name the page's ``labels`` in place of the command line's options."""
+
+    def done() -> Found:
+        try:
+            return work()
+        except ValueError as error:
+            raise CommandError(OPTION.sub(lambda option: labels.get(option[0], option[0]), str(error))) from error
+
+    return done
 
 
 def parts_of(text: str, mark: str) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from html import escape
 from pathlib import Path
 
@@ -19,14 +20,15 @@ from explorer.measured.readings import Brought, ScanUnit
 from explorer.scene.starter_files import check_name
 from explorer.viewer.actions import Post, on_upload
 from explorer.viewer.laboratory.answer_view import AnswerView
-from explorer.viewer.laboratory.inputs import number_or_none, positive
+from explorer.viewer.laboratory.inputs import in_labels, number_or_none, positive
 from explorer.viewer.panel import LABORATORY, PageContext, Panel
 from explorer.viewer.view import small_html
+from solver.assets import shipped_measurements
 
 WAITING = (
-    "Photographs (of piles, or of the face of a turning drum), angles, balance curves or scans of pours of one set-up, "
-    "the k-th of each of pour k. Save them, and "
-    "the data set is in the list of Diagnose; then change the set-up's name to add another."
+    "Photographs (of piles, or of the face of a turning drum), angles, balance curves or scans from several pours of "
+    "one set-up. Add the files of every kind in the same order of pours. Save them, and the data set is in "
+    "the list of Diagnose; then change the set-up's name to add another."
 )
 UNITS: tuple[ScanUnit, ...] = ("m", "cm", "mm", "um")
 NOTHING = "No files yet."
@@ -45,6 +47,20 @@ PHOTOGRAPHS = Kind("photographs", "Add a photograph", PICTURES)
 BALANCES = Kind("balance", "Add a balance's curve", SUFFIXES)
 SCANS = Kind("scans", "Add a scan", (*SURFACES, *POINTS, *ARRAYS))
 KINDS = (PHOTOGRAPHS, BALANCES, SCANS)
+LABELS = {
+    "--condition": "Set-up's name",
+    "--angles": "Angles",
+    "--photo": PHOTOGRAPHS.label,
+    "--balance": BALANCES.label,
+    "--scan": SCANS.label,
+    "--scale": "Scale",
+    "--scan-unit": "Unit of scans",
+    "--starts": "Flow began at",
+    "--lag": "Lag of the balance",
+    "--set": "Set-up",
+    "--uncertainty": "Uncertainty",
+}
+"""Option of the command line → label of its field."""
 
 
 class MeasuredDataPanel(Panel):
@@ -81,7 +97,9 @@ class MeasuredDataPanel(Panel):
             "Flow began at [s]", "", hint="On the balance's clock, one or one for each curve, between commas."
         )
         self._lag = gui.add_text(
-            "Lag of the balance [s]", "", hint="Taken off its times; nothing: what is seen is told."
+            "Lag of the balance [s]",
+            "",
+            hint="Subtracted from the balance's times. If empty, a lag seen in the data is only reported.",
         )
         self._changes = gui.add_text(
             "Set-up", "", hint="What was otherwise than in the study: rig.outlet_height=90mm insertion.rate=0.2"
@@ -89,7 +107,9 @@ class MeasuredDataPanel(Panel):
         self._spread = gui.add_text(
             "Uncertainty", "", hint="Of one value, where one pour has no scatter: angle_of_repose_deg=1.5"
         )
-        save = gui.add_button("Save the data", hint="Read once, told what they can tell, and kept for Diagnose.")
+        save = gui.add_button(
+            "Save the data", hint="Reads the data, reports what they can show, and keeps them for Diagnose."
+        )
         self.view = AnswerView(page.server, WAITING, post)
         none.on_click(lambda _: post(self._forget))
         save.on_click(lambda _: post(self._save))
@@ -117,7 +137,10 @@ class MeasuredDataPanel(Panel):
         self._kept.content = small_html("<br>".join(map(escape, lines)) or NOTHING)
 
     def _save(self) -> None:
-        folder = self._uploads / check_name(str(self._set.value).strip())
+        name = check_name(str(self._set.value).strip())
+        if name in shipped_measurements():
+            raise CommandError(f"Data set: {name} comes with the program; choose another name")
+        folder = self._uploads / name
         changes = tuple(str(self._changes.value).split())
         if any(change.startswith("rig.mesh") for change in changes):
             # A browser names no file of this machine.
@@ -129,12 +152,15 @@ class MeasuredDataPanel(Panel):
             uncertainty=tuple(str(self._spread.value).split()),
         )
         brought = self._brought()
-        self._background.start("reading the data", lambda: measured_data_result(folder, asked, brought), self._done)
+        read = in_labels(lambda: measured_data_result(folder, asked, brought), LABELS)
+        self._background.start("reading the data", read, partial(self._done, brought))
 
     def _brought(self) -> Brought:
         starts = [number_or_none(part, "Flow began at") for part in str(self._starts.value).split(",")]
-        scale = positive(self._scale.value) if self._files[PHOTOGRAPHS] else None
         angles = str(self._angles.value).replace(" ", "")
+        if not angles and not any(self._files.values()):
+            raise CommandError(f"nothing was measured: give Angles, or {', '.join(kind.label for kind in KINDS)}")
+        scale = positive(self._scale.value) if self._files[PHOTOGRAPHS] else None
         if ".csv" in angles or ".xlsx" in angles:
             raise CommandError("Angles: allowed: numbers between commas; a file of them goes by the command line")
         return Brought(
@@ -148,7 +174,9 @@ class MeasuredDataPanel(Panel):
             scan_unit=next(unit for unit in UNITS if unit == self._unit.value),
         )
 
-    def _done(self, answer: CommandResult) -> None:
-        """The files are in the data set now; the next ones are of another condition."""
-        self._forget()
+    def _done(self, brought: Brought, answer: CommandResult) -> None:
+        """What was brought is in the data set now; other files, also those added meanwhile, are of the next one."""
+        read = {*brought.photographs, *brought.balances, *brought.scans}
+        self._files = {kind: [file for file in files if file not in read] for kind, files in self._files.items()}
+        self._tell()
         self.view.show(answer)

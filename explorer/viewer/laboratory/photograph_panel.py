@@ -35,7 +35,7 @@ NO_RULER = (
 )
 MARK = "Mark base line or a known length in it"
 NOTHING_MARKED = "Nothing is marked: the program finds the base line."
-NO_BOARD = "none: the base line tells the lens"
+NO_BOARD = "none: estimate lens distortion from the base line"
 OWN = "The study's target is that of its file. What is read off a photograph can take its place."
 
 

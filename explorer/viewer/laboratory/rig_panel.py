@@ -31,7 +31,7 @@ class RigPanel(Panel):
         self._rig = gui.add_dropdown(
             "Rig",
             tuple(BENCH_RIGS),
-            hint="Rigs that bodies are poured into are chosen under Pour, Rig and material.",
+            hint="Rigs that bodies are poured into are chosen in Set-up, under Rig and material.",
         )
         self._place = gui.add_folder(None)
         self._offer(page.session.status().scene)

@@ -134,8 +134,9 @@ class RecordingSwitch:
         if recorder is None or path is None:
             raise CommandError("recording: none is running")
         if isinstance(recorder, ScenePlayback):
-            self._recorder = None
+            # Refused while something else is being done; the recording goes on then.
             self._background.start("packing the recording", lambda: write_whole(path, recorder.html()), lambda _: None)
+            self._recorder = None
             return
         # In this order: whoever sees that nothing is recorded any more may open the files.
         try:
@@ -144,10 +145,17 @@ class RecordingSwitch:
             self._pours, self._recorder = recorder.pours, None
 
     def take(self, frame: Frame, status: Status) -> None:
-        """Hand on what the page shows, if it is being recorded; a web page that is full is ended."""
+        """Hand on what the page shows, if it is being recorded; a web page that is full is ended.
+
+        So is a recording that cannot go on, which raises what is wrong.
+        """
         if self._recorder is None:
             return
-        self._recorder.take(frame, status)
+        try:
+            self._recorder.take(frame, status)
+        except (ValueError, OSError):
+            self.end()
+            raise
         if isinstance(self._recorder, ScenePlayback) and self._recorder.full and not self._background.busy_with:
             self.end()
 

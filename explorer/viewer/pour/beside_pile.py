@@ -79,11 +79,12 @@ class BesidePile:
 
     def pour(self, scene: Scene, seed: int, names: tuple[str, str] = ("first pour", "second pour")) -> None:
         """Begin the second pour, in place of one before it; ``names`` stand above both, with what they have come to."""
+        second = self._second or self._open()
+        second.start(scene, seed)  # where that is refused, all stays as it was
         self._take_signs_away()
         if self._second is None:
-            self._second = self._open()
+            self._second = second
             self._step_aside(scene, 0.5 * BESIDE)
-        self._second.start(scene, seed)
         self._names = {name: self._sign(name, x, scene) for name, x in zip(names, (0.0, BESIDE), strict=True)}
 
     def show_measured(self, surface: HeightSurface | None, text: str, scene: Scene) -> None:

@@ -116,9 +116,9 @@ class ChangesPanel(Panel):
     def _apply(self, name: str) -> None:
         if name == NO_PRESET:
             return
+        self._preset.value = NO_PRESET  # type: ignore[misc]  # also of one that is refused: it can be chosen again
         preset = read_preset(preset_path(name, self._folder))
         apply_preset(self._session, preset)
-        self._preset.value = NO_PRESET  # type: ignore[misc]
         self._say(f"{preset.title}: {preset.about}")
 
     def _save(self) -> None:

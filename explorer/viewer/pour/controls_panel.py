@@ -1,4 +1,4 @@
-"""The controls that stay in sight: six sliders, *Pour again*, and *Pour a second* for a pile beside it.
+"""The controls that stay in sight: six sliders, *Pour again* (by key too), and *Pour a second* for a pile beside it.
 
 Five act on the running pour; the feed rate acts on the next one. Each stands for one physical quantity, wherever in the
 scene it occurs; what one slider moves together is set apart under Set-up.
@@ -7,9 +7,10 @@ scene it occurs; what one slider moves together is set apart under Set-up.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from explorer.live.messages import Status
-from explorer.viewer.actions import button_group
+from explorer.viewer.actions import add_keys, button_group
 from explorer.viewer.panel import CONTROLS, PageContext
 from explorer.viewer.pour.live_sliders import LiveControl, control_for, screen_range, titled
 from explorer.viewer.pour.rebuilt_panel import RebuiltPanel
@@ -18,7 +19,8 @@ from explorer.viewer.pour.second_pile import POUR_SECOND, SECOND_HINT
 from solver.scenes.material import Pair
 from solver.scenes.scene import Scene, parameters, value, with_values
 
-AGAIN, SAME_SEED = "Pour again", "Same seed"
+AGAIN, SAME_SEED, RESTART = "Pour again", "Same seed", "Pour again (R)"
+KEYS: dict[str, Any] = {RESTART: "R"}
 FEED_RATE = "insertion.rate"
 
 
@@ -26,6 +28,15 @@ class ControlsPanel(RebuiltPanel["Controls"]):
     """What is always in sight."""
 
     name, tab = "controls", CONTROLS
+
+    def __init__(self, page: PageContext) -> None:
+        super().__init__(page)
+        page.channel.offer("restart", lambda _: page.post(self._again))
+        add_keys(page.server.gui, {RESTART: self._again}, KEYS, page.post)
+
+    def _again(self) -> None:
+        """What the timeline and its key ask for: the same as *Same seed*, with the feed rate that was entered."""
+        self._controls.pour(0)
 
     def build(self, scene: Scene) -> Controls:
         """Make the sliders for ``scene``."""
@@ -63,7 +74,7 @@ class Controls:
         button_group(
             gui,
             AGAIN,
-            {"New seed": lambda: self._pour(1), SAME_SEED: lambda: self._pour(0)},
+            {"New seed": lambda: self.pour(1), SAME_SEED: lambda: self.pour(0)},
             post,
             hint="Pours anew with the parameters as they are now. The same seed gives the same pile, to the last bit; "
             "a new one shows how piles of the same parameters scatter.",
@@ -92,14 +103,15 @@ class Controls:
                 for label, paths in quantities(scene).items()
             ]
 
-    def _pour(self, step: int) -> None:
+    def pour(self, step: int) -> None:
+        """Pour anew with the feed rate that was entered, and the ``step``-th seed after the present one."""
         status = self._session.status()
         scene = status.scene
         if self._feed is not None:
             wanted = entered(parameters(scene)[FEED_RATE], self._feed.value)
             if not same_value(value(scene, FEED_RATE), wanted):
                 scene = with_values(scene, {FEED_RATE: wanted})
-        self._session.restart(scene, (status.seed + step) % LARGEST_SEED)
+        self._session.restart(scene, (status.seed + step) % (LARGEST_SEED + 1))
 
 
 def quantities(scene: Scene) -> Mapping[str, tuple[str, ...]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,8 @@ class OutlinePanel(Panel):
         self._drawn: tuple[Outline | None, MeasuredCurve | None, bool] = (None, None, False)
         self._curves: Mapping[str, MeasuredCurve] = {}
         self._measured: MeasuredCurve | None = None
+        self._chosen = NONE
+        self._reading: str | None = None
         self._html = gui.add_html(outline_html(None, None))
         self._in_scene = gui.add_checkbox(
             "Lines in 3-D", True, hint="Draw the lines of the flanks, and what was measured, in the scene too."
@@ -76,7 +79,9 @@ class OutlinePanel(Panel):
         on_upload(self._upload, self._take, post)
 
     def show(self, now: Now) -> None:
-        """Draw what is new."""
+        """Draw what is new; a choice that was refused is set back to what is drawn."""
+        if self._data.value != self._chosen and self._background.busy_with != self._reading:
+            self._data.value = self._chosen  # type: ignore[misc]
         drawn = (now.status.outline, self._measured, bool(self._in_scene.value))
         if all(new is old for new, old in zip(drawn, self._drawn, strict=True)):
             return
@@ -101,22 +106,24 @@ class OutlinePanel(Panel):
 
     def _offer_kept(self, found: tuple[Path, Mapping[str, MeasuredCurve]]) -> None:
         folder, curves = found
-        self._folder.value, self._data.value = str(folder), OWN  # type: ignore[misc]
-        self._offer(curves)
+        self._folder.value = str(folder)  # type: ignore[misc]
+        self._offer(OWN, curves)
 
     def _offer_one(self, curve: MeasuredCurve) -> None:
-        self._data.value = NONE  # type: ignore[misc]
-        self._offer({curve.name: curve})
+        self._offer(NONE, {curve.name: curve})
 
     def _choose_data(self, chosen: str) -> None:
         name = str(self._folder.value).strip() if chosen == OWN else chosen
         if chosen == NONE or not name:
-            self._offer({})
+            self._offer(chosen, {})
             return
-        self._background.start(f"reading {name}", lambda: measured_curves(name), self._offer)
+        what = f"reading {name}"
+        self._background.start(what, lambda: measured_curves(name), partial(self._offer, chosen))
+        self._reading = what
 
-    def _offer(self, curves: Mapping[str, MeasuredCurve]) -> None:
-        self._curves = curves
+    def _offer(self, chosen: str, curves: Mapping[str, MeasuredCurve]) -> None:
+        self._chosen, self._curves = chosen, curves
+        self._data.value = chosen  # type: ignore[misc]
         names = tuple(curves) or (NONE,)
         self._curve.options = names
         self._curve.value = names[0]  # type: ignore[misc]

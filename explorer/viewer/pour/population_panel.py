@@ -26,7 +26,7 @@ from solver import Scene
 OBSERVABLE = "angle_of_repose_deg"
 MORE = 8
 """Pours of one order."""
-POUR_MORE, POUR_BOTH = f"Pour {MORE} more", f"Pour {MORE} of each"
+POUR_MORE, POUR_BOTH = f"Pour {MORE} more", "Pour to compare"
 SETTLED = 0.7
 """Wall time [s] for which parameters have to stay before their pours are looked for: a slider's drag asks once."""
 AGAIN = 4.0
@@ -273,13 +273,14 @@ def _few(population: Population) -> str:
     n, void = population.n, population.void
     lost = f" {void} more gave no valid pile." if void else ""
     if n == 0:
-        return "No other pour with these parameters is stored: one pour tells no scatter." + lost
+        return "No other pour with these parameters is stored, so the scatter between pours is unknown." + lost
     if n == 1:
         return f"One stored pour, {population.values[0]:.1f}°: how far seeds scatter is unknown." + lost
     low, high = population.interval
     mean = f"mean 95 % {low:.1f} … {high:.1f}°"
     # Standard error of a standard deviation of normal values: σ/√(2(n − 1)).
-    few = f"; so few tell the SD to some {100 / math.sqrt(2 * (n - 1)):.0f} % only" if n < TRUSTED else ""
+    known = 100 / math.sqrt(2 * (n - 1))
+    few = f"; with so few pours the SD is known only to about ±{known:.0f} %" if n < TRUSTED else ""
     return f"{mean}{few}.{lost}"
 
 

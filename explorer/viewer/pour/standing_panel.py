@@ -149,7 +149,7 @@ def standing_text(before: Scene, now: Scene, moved: npt.NDArray[np.float32]) -> 
     many = f"{loose} of {len(moved)} bodies by more than {1e3 * STOOD:g} mm, up to {furthest}"
     names = escape("; ".join(change_lines(found)))
     if loose > FEW * len(moved):
-        return f"<b>Not poured with these values</b>, but moved by them: {many}. {names}."
+        return f"<b>The change itself moved the pile</b>; it was not poured with these values: {many}. {names}."
     acts = dict.fromkeys(WHEN.get(one.path.rpartition(".")[2], OTHERWISE) for one in found)
     little = many if loose else f"no body moved by more than {furthest}"
     return f"{names}: <b>the pile stands</b> ({little}); {', '.join(acts)}: shake it, tap it, or pour again."

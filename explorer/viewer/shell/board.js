@@ -101,6 +101,8 @@ function show(board) {
   if (!parts.length || (!board.title && !board.subtitle)) {
     parts.unshift(element("p", { class: "empty" }, "Nothing to show yet. What is started above appears here, and so does what is chosen under Other results."));
   }
+  // A chart that is only taken away keeps its listener of the window's size, and a 3-D one its WebGL context.
+  for (const box of place.querySelectorAll(".js-plotly-plot")) Plotly.purge(box);
   place.replaceChildren(...parts);
   for (const one of place.querySelectorAll("details")) if (open.has(one.firstChild.textContent)) one.open = true;
   window.scrollTo(0, at);

@@ -1,4 +1,4 @@
-"""The timeline below the page: play, pause, step, go to a moment, pour again, speed; what happened when; by key too."""
+"""The timeline below the page: play, pause, step, go to a moment, speed; what happened when; by key too."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from explorer.viewer.actions import add_keys
 from explorer.viewer.panel import AROUND, Now, PageContext, Panel
 from explorer.viewer.pour.readout import PHASE_WORDS, STATE_WORDS, TROUBLE, condition
 
-PLAY_PAUSE, BACK, STEP, RESTART = "Play / pause (space)", "◀ Back (←)", "Step ▶ (→)", "Pour again (R)"
-KEYS: dict[str, Any] = {PLAY_PAUSE: "space", RESTART: "R", BACK: "arrowleft", STEP: "arrowright"}
+PLAY_PAUSE, BACK, STEP = "Play / pause (space)", "◀ Back (←)", "Step ▶ (→)"
+KEYS: dict[str, Any] = {PLAY_PAUSE: "space", BACK: "arrowleft", STEP: "arrowright"}
+MOVING = (SessionState.RUNNING, SessionState.STARTING)
+"""States in which the main button pauses; in the others it plays."""
 SLOWEST, FASTEST = 0.05, 2.0
 """Range of the speed: simulated seconds per second."""
 SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0)
@@ -33,11 +35,10 @@ class Timeline(Panel):
     def __init__(self, page: PageContext) -> None:
         session, post = page.session, page.post
         self._page, self._session = page, session
-        acts = {PLAY_PAUSE: self._toggle, BACK: session.step_back, STEP: session.step, RESTART: session.restart}
+        acts = {PLAY_PAUSE: self._toggle, BACK: session.step_back, STEP: session.step}
         page.channel.offer("toggle", lambda _: post(self._toggle))
         page.channel.offer("back", lambda _: post(session.step_back))
         page.channel.offer("step", lambda _: post(session.step))
-        page.channel.offer("restart", lambda _: post(session.restart))
         page.channel.offer("seek", lambda command: post(partial(self._seek, command.get("time"))))
         page.channel.offer("speed", lambda command: post(partial(self._set_speed, command.get("factor"))))
         add_keys(page.server.gui, acts, KEYS, post)
@@ -47,10 +48,10 @@ class Timeline(Panel):
         self._page.channel.tell("timeline", timeline_state(now, self._page.recording.state.words))
 
     def _toggle(self) -> None:
-        if self._session.status().state == SessionState.PAUSED:
-            self._session.play()
-        else:
+        if self._session.status().state in MOVING:
             self._session.pause()
+        else:
+            self._session.play()
 
     def _seek(self, wanted: object) -> None:
         """Go back to ``wanted`` [s], with the parameters of that moment; a later moment has to be computed first."""
@@ -67,14 +68,13 @@ class Timeline(Panel):
 def timeline_state(now: Now, recording: str) -> Mapping[str, Any]:
     """What the timeline shows; ``recording``: what is recorded, in a few words, empty if nothing is."""
     status = now.status
-    moving = status.state in (SessionState.RUNNING, SessionState.STARTING)
     earliest = status.earliest if math.isfinite(status.earliest) else 0.0
     mine = [event for event in now.events if event.generation == status.generation and event.time <= status.time]
     return {
         "time": status.time,
         "earliest": min(earliest, status.time),
         "end": status.time,
-        "playing": moving,
+        "playing": status.state in MOVING,
         "speed": status.speed,
         "speeds": SPEEDS,
         "condition": condition_words(now),

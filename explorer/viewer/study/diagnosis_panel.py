@@ -45,9 +45,9 @@ from solver import EFFECTS, Scene
 from solver.assets import shipped_measurements
 
 MOST_POURS = 100_000
-BY_ITSELF = (
-    f"As many pours as the program takes by itself: {Budget().base} of the declared model, {Budget().screening} of "
-    f"every direction of an effect, then {Budget().more} at a time of what stays in question."
+AUTOMATIC = (
+    f"Automatic: {Budget().base} pours of the declared model, {Budget().screening} for each direction of an effect, "
+    f"then {Budget().more} at a time for effects still undecided."
 )
 FIRST = "trefoil_2"
 """Chosen at first, where it is shipped: the data set of `make diagnose`."""
@@ -66,16 +66,17 @@ class DiagnosisPanel(Panel):
     def __init__(self, page: PageContext) -> None:
         server, gui, diagnosis, post = page.server, page.server.gui, page.diagnosis, page.post
         self._diagnosis, self._file = diagnosis, ResultFile(RESULT)
-        self._shipped, self._uploads = shipped_measurements(), page.uploads
+        self._shipped, self._uploads, self._measured = shipped_measurements(), page.uploads, page.project.measured
         self._shown: Hashable = None
-        self._looked, self._stopped = ("", ""), False
+        self._looked: tuple[str, str] = ("", "")
+        self._stopped: Path | None = None
         self._data = gui.add_dropdown(
             "Measured data",
             self._offered(),
-            initial_value=FIRST if FIRST in self._shipped else OWN,
-            hint="Data sets that come with the program, those uploaded under Pour, or a folder of your own. With "
-            "nothing in the store all effects take some 150 to 400 pours: 15 to 40 min on two cores for the shipped "
-            "data, minutes for a second set of the same model.",
+            initial_value=next(iter(self._of_project()), FIRST if FIRST in self._shipped else OWN),
+            hint="The project's data set, those that come with the program, those uploaded under Pour or saved under "
+            "Laboratory, or a folder of your own. With nothing in the store all effects take some 150 to 400 pours: 15 "
+            "to 40 min on two cores for the shipped data, minutes for a second set of the same model.",
         )
         self._folder = gui.add_text(
             "Folder", "", hint="Folder with measurement.toml, on the machine that serves this page."
@@ -127,11 +128,11 @@ class DiagnosisPanel(Panel):
         self._offer_piles()
         self._board = BoardView(server, page.pages, "/diagnosis/page.json", "Diagnosis")
 
-    def _resumable(self, status: CommandStatus) -> bool:
-        """Looked up anew for other data, and when a diagnosis begins or ends: it reads folders."""
+    def _to_resume(self, status: CommandStatus) -> Path | None:
+        """Folder to go on in, looked up anew for other data, and when a diagnosis begins or ends: it reads folders."""
         chosen = self._chosen_data()
         if (status.state, chosen) != self._looked:
-            self._looked, self._stopped = (status.state, chosen), self._diagnosis.resumable(Question(chosen))
+            self._looked, self._stopped = (status.state, chosen), self._diagnosis.stopped(Question(chosen))
         return self._stopped
 
     def _start(self) -> None:
@@ -145,11 +146,22 @@ class DiagnosisPanel(Panel):
 
     def _offered(self) -> tuple[str, ...]:
         """What the list of data sets holds now."""
-        return (*self._shipped, *kept_measurements(self._uploads), OWN)
+        return (*self._of_project(), *self._shipped, *self._kept(), OWN)
+
+    def _of_project(self) -> dict[str, Path]:
+        """The project's own data set, by its title in the list, where it names one."""
+        return {} if self._measured is None else {f"{self._measured.name} (project)": self._measured}
+
+    def _kept(self) -> dict[str, Path]:
+        """Data sets of this server's user, by their titles in the list, none of which is a shipped one's."""
+        kept = kept_measurements(self._uploads).items()
+        return {f"{name} (own)" if name in self._shipped else name: folder for name, folder in kept}
 
     def _chosen_data(self) -> str:
-        chosen = str(self._folder.value if self._data.value == OWN else self._data.value)
-        return str(kept_measurements(self._uploads).get(chosen, chosen))
+        if self._data.value == OWN:
+            return str(self._folder.value)
+        chosen = str(self._data.value)
+        return str((self._kept() | self._of_project()).get(chosen, chosen))
 
     def _question(self) -> Question:
         return Question(self._chosen_data(), self._candidates.effects, self._candidates.budget)
@@ -163,8 +175,10 @@ class DiagnosisPanel(Panel):
         status = self._diagnosis.status()
         # How much more is poured, in this stage and after it, is decided by what comes out.
         waiting = self._diagnosis.waiting()
-        text = state_markdown(status, "diagnosis", "pours", now.notice, counted="known of this stage")
-        self._view.show(status, text + waiting_markdown(waiting), waiting, self._resumable(status))
+        stopped = self._to_resume(status)
+        goes_on = stopped is not None and stopped == self._diagnosis.out
+        text = state_markdown(status, "diagnosis", "pours", now.notice, counted="known of this stage", goes_on=goes_on)
+        self._view.show(status, text + waiting_markdown(waiting), waiting, stopped is not None)
         self._chooser.offer(self._diagnosis.finished())
         self._follow()
         self._offer_piles()
@@ -324,7 +338,7 @@ class CandidateEffects:
             name: gui.add_checkbox(name.replace("_", " "), True, hint=f"What reveals it: {kind.lever}.")
             for name, kind in EFFECTS.items()
         }
-        self._pours = gui.add_number("Pours (0: by itself)", 0, min=0, max=MOST_POURS, step=10, hint=BY_ITSELF)
+        self._pours = gui.add_number("Pours (0: automatic)", 0, min=0, max=MOST_POURS, step=10, hint=AUTOMATIC)
 
     @property
     def effects(self) -> tuple[str, ...]:

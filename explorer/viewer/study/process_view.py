@@ -17,13 +17,15 @@ MARKDOWN_MARKS = re.compile(r"([\\`*_{}\[\]<>()#+!|~&])")
 
 START, PAUSE, CONTINUE, CANCEL = "Start", "Pause", "Continue", "Cancel"
 RESUME, RETRY, QUEUE, CLEAR = "Resume last", "Retry", "Queue", "Clear queue"
+GOES_ON = f"Cancelled. What was poured is kept: *{RESUME}* goes on."
+"""Of a cancelled command that is the one to be resumed."""
 OFFERED = {"running": (PAUSE, CANCEL, QUEUE), "paused": (CONTINUE, CANCEL, QUEUE)}
 """State → buttons while a command is there; otherwise one can be started, resumed or tried again."""
 
 STATE_WORDS = {
     "running": "Running at low priority; the pour goes on.",
     "paused": "Paused: it stands still and keeps what it has.",
-    "cancelled": "Cancelled. What was poured is kept: *Resume last* goes on.",
+    "cancelled": "Cancelled. What was poured is kept.",
     "finished": "Finished.",
     "failed": "Failed.",
 }
@@ -100,7 +102,9 @@ def progress(status: CommandStatus) -> float:
     return min(1.0, max(0.0, status.done / status.planned)) if status.planned > 0 else 0.0
 
 
-def state_markdown(status: CommandStatus, what: str, runs: str, notice: str = "", counted: str = "") -> str:
+def state_markdown(
+    status: CommandStatus, what: str, runs: str, notice: str = "", counted: str = "", goes_on: bool = False
+) -> str:
     """State, messages and failed runs; texts of the command are escaped.
 
     Args:
@@ -109,8 +113,13 @@ def state_markdown(status: CommandStatus, what: str, runs: str, notice: str = ""
         runs: what is counted, such as "runs".
         notice: the page's own last message, such as a refused click.
         counted: what the numbers done and planned and the time left are of, where it is less than the whole.
+        goes_on: whether *Resume last* goes on with this very command, if it was cancelled.
     """
-    state = STATE_WORDS.get(status.state, f"No {what} is running." if what else "")
+    state = (
+        GOES_ON
+        if goes_on and status.state == "cancelled"
+        else STATE_WORDS.get(status.state, f"No {what} is running." if what else "")
+    )
     if status.alive and status.planned:
         part = f"{counted[0].upper()}{counted[1:]}: " if counted else ""
         state += f" {part}{status.done} of {status.planned} {runs}, time left {time_left(status.eta_s)}."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -45,7 +46,8 @@ class ResultChooser:
 
     def offer(self, folders: Sequence[Path]) -> None:
         """The finished results that there are now."""
-        self._folders = {title(folder): folder for folder in (*reversed(self._added), *folders)[:MOST]}
+        shown = list(dict.fromkeys(folder.absolute() for folder in (*reversed(self._added), *folders)))[:MOST]
+        self._folders = dict(zip(titles(shown), shown, strict=True))
         options = (self._first, *self._folders)
         if tuple(self._list.options) != options:
             self._list.options = options
@@ -55,7 +57,14 @@ class ResultChooser:
         if folder not in self._added:
             self._added.append(folder)
         self.offer([one for one in self._folders.values() if one not in self._added])
-        self._list.value = title(folder)
+        self._list.value = next(name for name, one in self._folders.items() if one == folder)
+
+
+def titles(folders: Sequence[Path]) -> list[str]:
+    """One for each of ``folders``, no two alike: with the folder above, or as a path, where another is called so."""
+    ways = (title, lambda folder: f"{folder.parent.name}/{folder.name}", str)
+    used = [(way, Counter(map(way, folders))) for way in ways]
+    return [next(way(folder) for way, count in used if count[way(folder)] == 1) for folder in folders]
 
 
 def title(folder: Path) -> str:

@@ -117,12 +117,13 @@ class StudyPanel(Panel):
         self._place.show()
         waiting = self._study.waiting()
         known = "" if self._result is not None else "study"
-        text = state_markdown(status, known, "runs", now.notice) + waiting_markdown(waiting)
+        resumable = self._resumable(status)
+        text = state_markdown(status, known, "runs", now.notice, goes_on=resumable) + waiting_markdown(waiting)
         if not status.alive or (present is not None and status.eta_s is None):
             text = f"{self._expected(status.state, present)}\n\n{text}"
         if self._trouble:
             text += f"\n\n{escaped(self._trouble)}"
-        self._view.show(status, text, waiting, self._resumable(status))
+        self._view.show(status, text, waiting, resumable)
         folders = self._study.finished()
         self._chooser.offer(folders)
         self._comparison.offer(folders)

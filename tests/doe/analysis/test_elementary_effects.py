@@ -96,3 +96,20 @@ def test_a_design_without_steps_of_one_factor_is_refused_and_runs_come_in_whole_
     assert len(DESIGNS["morris"].points(5, DesignOptions(runs=24)).coded) == 24
     with pytest.raises(StatisticsError, match=r"runs = 25: .* 6 runs; allowed: 24, 30, …"):
         DESIGNS["morris"].points(5, DesignOptions(runs=25))
+
+
+def test_a_jump_to_the_next_trajectory_is_no_step():
+    """Of one factor every jump moves it alone: ten trajectories of two runs have ten steps, and not nineteen."""
+    design = morris(1, 10, seed=1)
+    assert elementary_effects(design, design, "A").steps == 10
+
+
+def test_factors_that_are_left_out_stay_in_every_step(design):
+    y = (design @ np.array([1.0, 0.0, 100.0, 0.0, 0.0]))[:, None]
+    whole = elementary_effects(design, y, NAMES)
+    found = elementary_effects(design[:, :1], y, NAMES[:1], others=design[:, 1:])
+    assert (found.steps, found.lost) == (TRAJECTORIES, 0)
+    assert np.array_equal(found.effects[0].effects, whole.effects[0].effects)
+    unknown = design[:, 1:].copy()
+    unknown[np.flatnonzero(np.diff(design[:, 0]))[0]] = np.nan  # before a step of A: it may not be one of A alone
+    assert elementary_effects(design[:, :1], y, NAMES[:1], others=unknown).steps == TRAJECTORIES - 1

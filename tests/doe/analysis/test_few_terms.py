@@ -1,9 +1,13 @@
 """Few terms under heredity: a published reanalysis, planted models, noise, and what each column carries in part."""
 
+from fractions import Fraction
+from itertools import combinations
+
 import numpy as np
 import pytest
 
-from doe.analysis.few_terms import few_terms, partial_aliases
+from doe.analysis.few_terms import few_terms, main_effect_aliases
+from doe.designs import DESIGNS, DesignOptions
 from doe.designs.plackett_burman import plackett_burman
 
 # Hunter, Hodi and Eager 1982: log life of repaired castings in a Plackett-Burman design of 12 runs, factors A to G.
@@ -55,11 +59,32 @@ def test_an_interaction_needs_one_of_its_factors():
 
 
 def test_in_twelve_runs_every_factor_carries_a_third_of_each_interaction_without_it():
-    found = partial_aliases(CAST, NAMES)
+    found = main_effect_aliases(CAST, NAMES)
     for name in NAMES:
         assert len(found[name]) == 15  # pairs of the other six
         assert {one.lstrip("-").split()[0] for one in found[name]} == {"1/3"}
     assert ("-1/3 B*G" in found["F"]) == (int((CAST[:, 5] * CAST[:, 1] * CAST[:, 6]).sum()) == -4)
+
+
+def test_an_interaction_that_is_a_main_effect_wholly_is_told():
+    """2^(11-7) of 16 runs, too many factors for all products: B*K, C*L and H*J are A."""
+    levels = DESIGNS["factorial"].points(11, DesignOptions(runs=16)).coded.astype(np.int64)
+    found = main_effect_aliases(levels, "ABCDEFGHJKL")
+    assert found["A"] == ("B*K", "C*L", "H*J")
+    turned = levels * np.where(np.arange(11) == 1, -1, 1)
+    assert main_effect_aliases(turned, "ABCDEFGHJKL")["A"] == ("-B*K", "C*L", "H*J")
+
+
+def test_shares_of_a_design_that_is_not_orthogonal_are_those_of_least_squares():
+    levels = DESIGNS["d-optimal"].points(5, DesignOptions(runs=10, model="linear")).coded.astype(np.int64)
+    names, found = "ABCDE", main_effect_aliases(levels, "ABCDE")
+    for i, j in combinations(range(5), 2):
+        share = np.linalg.lstsq(np.column_stack([np.ones(10), levels]), levels[:, i] * levels[:, j], rcond=None)[0][1:]
+        told = [{one.split()[1]: one.split()[0] for one in found[name]} for name in names]
+        assert [float(Fraction(one.get(f"{names[i]}*{names[j]}", "0"))) for one in told] == pytest.approx(
+            share, abs=1e-9
+        )
+    assert "-2/7 A*B" in found["A"]  # a factor's own interaction leaks into it too
 
 
 def test_nothing_is_searched_in_too_few_rows_or_too_many_factors():

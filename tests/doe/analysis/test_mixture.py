@@ -126,3 +126,25 @@ def test_too_few_runs_and_too_many_blends_are_refused():
         simplex_lattice(12, 8)
     with pytest.raises(StatisticsError, match="2 to 10"):
         DESIGNS["mixture"].points(11, DesignOptions())
+
+
+@pytest.mark.parametrize("value", [5.0, 0.1 + 0.2])
+def test_a_constant_response_has_no_r_squared_and_no_sum_of_squares(value):
+    same = np.full((6, 3), value)
+    same[0, 0] = np.nextafter(value, np.inf)  # rounding is no scatter
+    found = fit_mixture(BLENDS, same, NONE, "ABC", "quadratic")
+    assert np.isnan(found.shares_explained).all()
+    assert {row.sum_of_squares for row in found.rows} == {0.0}
+    assert np.isnan([*found.p, *(row.p for row in found.rows)]).all()
+    assert found.sigma == 0.0
+
+
+def test_the_highest_blend_keeps_to_the_highs():
+    """With c = 0.3 the polynomial of the lattice is highest at b = 4.7/38 = 0.124, by its slope along a + b = 0.7."""
+    highs = np.array([1.0, 1.0, 0.3])
+    found = fit_mixture(BLENDS, ELONGATION, NONE, "ABC", "quadratic", highs)
+    assert found.highest.amounts == pytest.approx([0.7 - 4.7 / 38, 4.7 / 38, 0.3], abs=found.step)
+    assert fit_mixture(BLENDS, ELONGATION, NONE, "ABC", "quadratic", np.ones(3)).highest.amounts[2] > 0.6
+    # Highs between two steps of the lattice: what was run is left.
+    narrow = fit_mixture(BLENDS, ELONGATION, NONE, "ABC", "quadratic", np.full(3, 0.3331))
+    assert narrow.highest.amounts.tolist() in BLENDS.tolist()

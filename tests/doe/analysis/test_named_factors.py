@@ -190,3 +190,11 @@ def test_of_many_combinations_of_names_those_that_were_run_are_listed():
     found = fit_named(coded, random.standard_normal((60, 1)), region("ABCD"), (NAMES,) * 4, "linear")
     assert len(found.groups) == len(np.unique(coded, axis=0)) <= 60 < MOST_COMBINATIONS < 4**4
     assert sum(group.runs for group in found.groups) == 60
+
+
+def test_combinations_that_nobody_ran_are_not_written_out():
+    """4^14 of them would take gigabytes."""
+    random = np.random.default_rng(0)
+    coded = codes(4)[random.integers(4, size=(60, 14))]
+    found = fit_named(coded, random.standard_normal((60, 1)), region("ABCDEFGHIJKLMN"), (NAMES,) * 14, "linear")
+    assert len(found.groups) == 60

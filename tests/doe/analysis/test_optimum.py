@@ -5,11 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from doe.analysis.optimum import compatible_share, find_optimum, solution_range
+from doe.analysis.optimum import compatible_share, find_compromise, find_optimum, solution_range
 from doe.analysis.steepest_ascent import Region
 from doe.analysis.surface import fit_surface, second_order_terms
 from doe.designs import box_behnken
 from doe.errors import StatisticsError
+from doe.target import Target
 
 REGION = Region(("G", "mu", "e"), np.array([50.0, 0.6, 0.6]), np.array([10.0, 0.1, 0.05]), ())
 DESIGN = box_behnken(3, centre=5)
@@ -137,3 +138,14 @@ def test_bad_input_is_named(options, message):
 def test_the_result_is_plain_json():
     result = json.loads(json.dumps(find_optimum(surface(), 40.0, [50.0, 0.6, 0.6]).to_dict(), allow_nan=False))
     assert result["solution_low"] == [None, None, None]
+
+
+@pytest.mark.parametrize("goal", [24.0, 25.0])
+def test_a_target_without_error_beside_a_model_without_one_leaves_a_compromise(goal):
+    """A response that never changes has no standard error: met or missed, the other target is met still."""
+    constant = fit_surface(DESIGN, np.full((17, 3), 24.0), REGION)
+    targets = [Target("a", 25.0, 1.0, 5), Target("b", goal)]
+    found = find_compromise([surface(), constant], targets, [50.0, 0.6, 0.6])
+    assert found.predicted == pytest.approx([25.0, 24.0], abs=0.01)
+    assert np.isfinite([found.misfit, *found.standardised]).all()
+    assert ("contradict" in found.statement) == (goal != 24.0)

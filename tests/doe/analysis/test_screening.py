@@ -201,6 +201,13 @@ def test_selection_fills_up_from_the_fallback_and_skips_what_cannot_be_tested():
     assert [(c.name, c.reason) for c in chosen] == [("X9", SIGNIFICANT), ("X7", FALLBACK), ("X16", FALLBACK)]
 
 
+def test_selection_skips_what_was_given_up_for_one_target_and_estimated_for_another():
+    first = screen(planted({"X9": 5.0}, 1.0, 3), [*DUMMIES, "X12"])
+    further = {"other": screen(planted({"X12": 8.0}, 1.0, 3), DUMMIES)}
+    chosen = select_factors(first, 2, fallback=["X7"], exclude=["X12"], further=further)
+    assert [c.name for c in chosen] == ["X9", "X7"]
+
+
 def test_selection_refuses_a_short_fallback_and_unknown_names():
     screening = screen(np.full((28, 2), 24.0), DUMMIES)
     with pytest.raises(StatisticsError, match="leaves 2 of 4 factors"):

@@ -9,6 +9,7 @@ from doe.audit.anova_table import consistency, read_lines, source_name
 from doe.audit.printed import most_agreed, printed, rounding_slack
 from doe.audit.restitution_formula import evaluated, flight, names_in
 from doe.audit.study import AnovaLine
+from doe.audit.verification import implied_target
 from doe.errors import AuditError
 
 
@@ -78,6 +79,14 @@ def test_the_majority_names_the_unknown_and_the_outlier():
     assert held == (True, True, True, False)
     low, high, _ = most_agreed([((1.0, 2.0),), ((5.0, 6.0),)], near=5.4)
     assert (low, high) == (5.0, 6.0)
+
+
+def test_errors_beyond_100_percent_imply_a_target_below_the_response_only():
+    stated, responses = printed("30.0"), tuple(map(printed, ("70.0", "80.0", "33.0")))
+    assert implied_target(responses, tuple(map(printed, ("133.3", "166.7", "5.0"))), stated) is None
+    other = implied_target(responses, tuple(map(printed, ("180.0", "220.0", "32.0"))), stated)
+    assert other is not None
+    assert other.value == 25.0
 
 
 def test_formulas():

@@ -147,6 +147,11 @@ def test_more_factors_than_columns_are_refused(factors):
         smallest_size(factors)
 
 
+def test_one_factor_has_no_interaction_to_be_confused_with():
+    points = DESIGNS["plackett-burman"].points(1, DesignOptions())
+    assert (points.coded.shape, points.aliases, points.notes) == ((8, 1), (), ())
+
+
 def test_plackett_burman_12_leaks_a_third_of_every_interaction():
     """Montgomery 2017, section 8.6.3: every main effect is aliased with every interaction of others at ±1/3."""
     aliases, pairs = interaction_aliases(plackett_burman(12))

@@ -164,3 +164,11 @@ def test_the_same_seed_gives_the_same_runs():
 def test_what_cannot_be_told_is_refused(options, message):
     with pytest.raises(StatisticsError, match=message):
         points("d-optimal", 2, **options)
+
+
+def test_a_region_that_no_corner_and_no_axis_reaches_is_searched_from_within():
+    """0.3 … 0.4 of one factor and 0.6 … 0.7 of the other, both of 0 … 1: its four corners are best."""
+    limits = ((1.0, 0.0, -0.2), (-1.0, 0.0, 0.4), (0.0, 1.0, 0.4), (0.0, -1.0, -0.2))
+    found = points("d-optimal", 2, runs=8, model="linear", constraints=limits).coded
+    corners = {(-0.4, 0.2), (-0.4, 0.4), (-0.2, 0.2), (-0.2, 0.4)}
+    assert {tuple(row) for row in found.round(9).tolist()} == corners

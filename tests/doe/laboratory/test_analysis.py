@@ -147,9 +147,18 @@ def test_without_a_camera_the_restitution_is_equation_7_and_says_so(tmp_path):
         ("a,b,replicate,drop_height_mm,v_x_m_s\ns,w,1,200,1\n", "stands alone"),
         ("a,b,replicate,drop_height_mm\ns,w,1,200\n", "distance_mm"),
         ("a,b,replicate,drop_height_mm,v_x_m_s,v_z_m_s\ns,w,1,200,2,0.5\n", "faster than the fall"),
+        (
+            "a,b,replicate,drop_height_mm,v_x_m_s,v_z_m_s\ns,w,1,200,1.4,1.35\n",
+            r"v_z_m_s: .* is 1\.388; allowed: 0 … 1",
+        ),
+        ("a,b,replicate,drop_height_mm,v_x_m_s,v_z_m_s\ns,w,1,200,0.2,-1.2\n", r"is -0\.5048; allowed: 0 … 1"),
+        (
+            "a,b,replicate,drop_height_mm,distance_mm\ns,w,1,200,900\n",
+            r"distance_mm: L/\(2H\) is 2\.25; allowed: up to 1",
+        ),
     ],
 )
-def test_a_drop_needs_a_flight_or_a_rebound(text, word, tmp_path):
+def test_a_drop_needs_a_flight_or_a_rebound_that_a_body_can_have(text, word, tmp_path):
     with pytest.raises(LaboratoryError, match=word):
         analyse("drop", written(tmp_path, text))
 

@@ -10,8 +10,8 @@ from scipy import stats
 from doe.laboratory import LabResult, analyse
 from doe.laboratory.reading_error import propagated, reading_error
 from doe.laboratory.replicates import summarise
-from doe.laboratory.tables import Reading
-from tests.doe.laboratory.readings import written
+from doe.laboratory.tables import LaboratoryError, Reading
+from tests.doe.laboratory.readings import assert_one_line, written
 
 
 def row(**values):
@@ -61,6 +61,25 @@ def test_propagation_is_what_a_draw_of_the_readings_scatters_by(tmp_path):
     assert reading.values[0] == pytest.approx(drawn.std(), rel=0.01)
     # One replicate has no scatter: ± 1.96 u.
     assert reading.high - reading.low == pytest.approx(2 * stats.norm.ppf(0.975) * reading.standard)
+
+
+@pytest.mark.parametrize(
+    ("test", "head", "row"),
+    [
+        ("drop", "a,b,replicate,drop_height_mm,drop_height_error_mm,v_x_m_s,v_z_m_s", "s,w,1,1,5,0.05,0.02"),
+        ("rebound", "a,b,replicate,drop_height_mm,drop_height_error_cm,rebound_height_mm", "s,w,1,10,1,5"),
+    ],
+)
+def test_an_error_as_large_as_a_reading_above_nought_is_refused(test, head, row, tmp_path):
+    path = written(tmp_path, f"{head}\n{row}\n")
+    with pytest.raises(LaboratoryError) as caught:
+        analyse(test, path)
+    assert_one_line(caught.value, path, ["row 2", "column drop_height_error_", "allowed: below the reading beside it"])
+
+
+def test_an_error_may_take_a_reading_to_nought_where_nought_is_allowed(tmp_path):
+    text = "a,b,replicate,drop_height_mm,rebound_height_mm,rebound_height_error_mm\ns,w,1,300,1,2\n"
+    assert analyse("rebound", written(tmp_path, text)).derived[0].reading.standard > 0.0
 
 
 def test_errors_and_scatter_together_by_hand():

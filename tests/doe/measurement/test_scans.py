@@ -171,9 +171,41 @@ def test_files_belong_to_conditions_and_replicates(tmp_path):
         scan_files(tmp_path, ["slow"])
 
 
+@pytest.mark.parametrize("head", ["", "x{0}y{0}z\n"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+@pytest.mark.parametrize(
+    ("name", "between", "decimal"),
+    [
+        ("scan.csv", ";", ","),
+        ("scan.csv", "; ", "."),
+        ("scan.txt", "\t", ","),
+        ("scan.xyz", " ", ","),
+        ("scan.csv", ",", "."),
+        ("scan.txt", ", ", "."),
+    ],
+)
+def test_a_comma_is_decimal_where_something_else_divides_the_cells(tmp_path, name, between, decimal, head, encoding):
+    axis = np.arange(-10, 10) + 0.5
+    x, y = np.meshgrid(axis, axis)
+    places = np.stack([x, y, np.maximum(0.0, 5.25 - np.hypot(x, y))], axis=-1).reshape(-1, 3)
+    rows = [between.join(f"{number:.3f}".replace(".", decimal) for number in row) for row in places]
+    path = tmp_path / name
+    path.write_bytes((head.format(between) + "\n".join(rows) + "\n").encode(encoding))
+    scan = read_scan(path, ScanSettings(unit="mm", axis=(0.0, 0.0), plate=(0.0, 0.0, 0.0)))
+    assert 1e3 * scan.points == pytest.approx(np.round(places, 3), abs=1e-9)
+
+
+def test_commas_divide_the_cells_of_a_row_with_blanks_in_its_last_one(tmp_path):
+    path = tmp_path / "scan.csv"
+    path.write_text("x,y,z,note\n" + "".join(f"{x},{y},{x * y},a note\n" for x in range(20) for y in range(20)))
+    scan = read_scan(path, ScanSettings(axis=(0.0, 0.0), plate=(0.0, 0.0, 0.0)))
+    assert scan.points[43].tolist() == [2.0, 3.0, 6.0]
+
+
 @pytest.mark.parametrize(
     ("name", "content", "line"),
     [
+        ("scan.xyz", b"\0\0", "not a text file"),
         ("scan.ply", b"no surface", "cannot be read"),
         ("scan.xyz", b"1 2 3\n", "1 points that are finite; allowed: 200"),
         ("scan.csv", b"x,y,z\na,b,c\n", "no table of x, y, z"),

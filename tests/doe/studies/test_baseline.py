@@ -77,6 +77,26 @@ def test_another_verdict_mean_noise_and_parameter_are_named(planted):
     assert compared["parameter", dropped] in moved(tuple(compared.values()))
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "shift", "answer"),
+    [
+        ("equivalent", "different", 0.05, "moved"),
+        ("cannot tell", "equivalent", 0.05, "cannot tell"),
+        ("different", "cannot tell", 0.05, "cannot tell"),
+        ("cannot tell", "different", 9.0, "moved"),
+        ("cannot tell", "cannot tell", 9.0, "same"),
+    ],
+)
+def test_a_verdict_has_moved_from_one_side_to_the_other_or_with_the_means(planted, old, new, shift, answer):
+    def told(verdict, mean):
+        (test,) = planted.verification.tests
+        of = dataclasses.replace(test, simulated=Sample(mean, 2.0, 20), verdict=verdict)
+        return dataclasses.replace(planted, verification=dataclasses.replace(planted.verification, tests=(of,)))
+
+    compared = by_name(compare(told(old, 24.0), told(new, 24.0 + shift)))
+    assert next(one.answer for (kind, _), one in compared.items() if kind == "verdict") == answer
+
+
 def test_parameters_by_their_intervals(planted, monkeypatch):
     path, *_ = planted.optimum.values
     factor = next(one for one in planted.optimum.factors if one.path == path)

@@ -8,7 +8,7 @@ import pytest
 
 from doe.analysis.power import smallest_effect, smallest_main_effect
 from doe.designs import DESIGNS, ChosenDesign, DesignOptions
-from doe.errors import StudyStopped
+from doe.errors import StatisticsError, StudyStopped
 from doe.stages import planned_runs
 from doe.stages.pilot import pilot
 from doe.studies.campaign import run_campaign
@@ -74,6 +74,16 @@ def test_the_pilot_tells_what_the_screening_s_own_design_resolves(study):
     sigma, factors = found.noise[study.targets[0].observable].sigma, len(study.factors)
     assert found.resolutions[1].main_effect == smallest_main_effect(sigma, 2, 40)
     assert found.resolutions[1].main_effect_bonferroni == smallest_main_effect(sigma, 2, 40, comparisons=factors)
+
+
+def test_an_estimator_that_reads_no_pile_is_no_candidate_and_stops_nothing(study):
+    unread = study.estimators[-1]
+    found = pilot(study, PROFILE, FormulaRunner(planted, others={unread: lambda values: np.nan}), BIAS)
+    assert unread not in found.noise
+    assert found.choice.estimators == study.estimators[:-1]
+    assert any(note.startswith(f"{unread} is no candidate") for note in found.notes)
+    with pytest.raises(StatisticsError, match=r"^angle_of_repose_deg: values holds 0 valid run"):
+        pilot(study, PROFILE, FormulaRunner(planted, others={"angle_of_repose_deg": lambda values: np.nan}), BIAS)
 
 
 def test_planted_factors_are_found_and_the_others_are_not(campaign):

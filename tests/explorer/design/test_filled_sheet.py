@@ -307,6 +307,37 @@ def test_blocks_of_whole_replicates_hold_every_row_of_any_design(tmp_path):
         assert np.array_equal(np.bincount(rows), np.full(17, 2))
 
 
+FINISHED = (
+    "# factor | a | 0 | 1\n# factor | b | 0 | 1\nrow,seed,a,b,y\n1,11,0,0,1.5\n2,40,1,0,2\n3,13,0,1,3\n4,,1,1,4\n"
+)
+
+
+def augmented(folder, sheet, **order):
+    text = 'responses = ["y"]\n' + "".join(f'[[factor]]\nname = "{name}"\nlow = 0\nhigh = 1\n' for name in "ab")
+    file = read_factors(factors_file(folder, text))
+    return make_plan(DesignOrder("d-optimal", augment=sheet_file(folder, sheet), runs=4, **order), file)
+
+
+def test_finished_runs_keep_their_seeds_and_new_ones_count_on(tmp_path):
+    seeds = augmented(tmp_path, FINISHED).seeds.tolist()
+    assert seeds[:3] == [11, 40, 13]
+    assert sorted(seeds[3:]) == [41, 42, 43, 44, 45]  # the fourth had none
+    assert sorted(augmented(tmp_path, FINISHED.replace("seed", "day")).seeds.tolist()) == list(range(1, 9))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("1,11,0,0,1.5", '1,11,0,0,"1,5"', "line 4, column y: '1,5' is not a number"),
+        ("1,11,0,0,1.5", "1,0.5,0,0,1.5", "line 4, column seed: 0.5; allowed: a whole number"),
+        ("1,11,0,0,1.5", "1,-4,0,0,1.5", "line 4, column seed: -4; allowed: a whole number"),
+    ],
+)
+def test_a_finished_run_that_cannot_be_read_is_named_by_line_and_column(tmp_path, old, new, message):
+    with pytest.raises(CommandError, match=message):
+        augmented(tmp_path, FINISHED.replace(old, new))
+
+
 def test_a_factor_called_block_is_refused_where_there_are_blocks(tmp_path):
     file = read_factors(factors_file(tmp_path, FACTORS.replace('"strength"', '"block"')))
     assert len(make_plan(DesignOrder("factorial"), file).block) == 0

@@ -7,7 +7,10 @@ import pandas as pd
 import pytest
 import statsmodels.formula.api as smf
 
+from doe.analysis.surface_anova import CONSTANT
+from doe.designs import morris
 from explorer.design.analysis import FAR, AnalyseOrder, run_analyse
+from explorer.design.factors_file import coded_constraint, make_factor
 from explorer.errors import CommandError
 
 HEAD = "# factor | temp | 150 | 200 | °C\n# factor | agit | 5 | 10\n# factor | rate | 15 | 25\ntemp,agit,rate,visc\n"
@@ -153,3 +156,44 @@ def test_a_block_that_is_none_is_refused_in_one_line(tmp_path):
         analysed(tmp_path, BLOCKED.replace("b1,80,170", ",80,170"), "", block="batch")
     with pytest.raises(CommandError, match="every valid run is in block 'b1'; at least two"):
         analysed(tmp_path, BLOCKED.replace("b2,", "b1,"), "", block="batch")
+
+
+NAMED_AS_LETTERS = "# factor | T | 0 | 1\n# factor | C | 0 | 1\n# factor | P | 0 | 1\nT,C,P,y\n"
+
+
+def test_a_name_that_is_another_factor_s_letter_is_the_name(tmp_path):
+    """T, C and P go by the letters A, B and C: the response follows the factor C, whose letter is B."""
+    runs = "".join(f"{t},{c},{p},{5 * c + 0.1 * t * p}\n" for t in (0, 1) for c in (0, 1) for p in (0, 1))
+    found = analysed(tmp_path, runs, NAMED_AS_LETTERS, terms=("C",)).analysis.model
+    assert np.array(found.surface.terms)[found.surface.included].tolist() == ["intercept", "B"]
+    assert found.anova.r_squared > 0.99
+    assert analysed(tmp_path, runs, NAMED_AS_LETTERS, terms=("P", "A")).analysis.model.anova.r_squared < 0.01
+
+
+def test_a_constraint_on_a_name_that_is_another_factor_s_letter_is_on_the_name():
+    factors = tuple(make_factor(name, 0.0, 1.0, "", None, "factor") for name in "TCP")
+    assert coded_constraint("C <= 0.5", factors) == pytest.approx((0.0, 0.5, 0.0, 0.0))
+    assert coded_constraint("B + A <= 0.5", factors) == pytest.approx((0.5, 0.5, 0.0, -0.5))
+
+
+def test_a_constant_mixture_is_told_in_a_note(tmp_path):
+    blends = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.5, 0.5, 0), (0.5, 0, 0.5), (0, 0.5, 0.5)] * 2
+    parts = "# factor | a | 0 | 1\n# factor | b | 0 | 0.5\n# factor | c | 0 | 1\na,b,c,y\n"
+    same = "".join(f"{a},{b},{c},5.1\n" for a, b, c in blends)
+    assert analysed(tmp_path, same, parts).analysis.notes[1] == CONSTANT
+    other = "".join(f"{a},{b},{c},{5 + a + 2 * b}\n" for a, b, c in blends)
+    found = analysed(tmp_path, other, parts).analysis
+    assert CONSTANT not in found.notes
+    assert found.mixture.highest.amounts == pytest.approx([0.5, 0.5, 0.0])  # b keeps to its high
+
+
+def test_effects_of_some_factors_of_a_morris_design_come_from_its_own_steps(tmp_path):
+    """y = 100 x2 + x0: where x0 alone moves the response changes by its 1 alone, whatever else is left out."""
+    design = (morris(3, 10, 1) + 1) / 2
+    head = "# design | morris\n" + "".join(f"# factor | x{k} | 0 | 1\n" for k in range(3)) + "x0,x1,x2,y\n"
+    runs = "".join(f"{a:.12g},{b:.12g},{c:.12g},{100 * c + a:.12g}\n" for a, b, c in design)
+    whole = analysed(tmp_path, runs, head).analysis.elementary
+    found = analysed(tmp_path, runs, head, only=("x0",)).analysis.elementary
+    assert (whole.steps, found.steps) == (30, 10)
+    assert found.effects[0].mu_star == pytest.approx(1.0)
+    assert found.effects[0].effects == pytest.approx(whole.effects[0].effects)

@@ -4,6 +4,8 @@ import json
 import os
 import shutil
 import sys
+from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -166,7 +168,7 @@ class FakeDiagnosis:
     """Keeps what it was asked; its status and its folder are what the test says."""
 
     def __init__(self):
-        self.asked, self.now, self.out = [], CommandStatus("idle"), None
+        self.asked, self.now, self.out, self.left = [], CommandStatus("idle"), None, Path("stopped")
 
     def start(self, question):
         self.asked.append(("start", question))
@@ -189,8 +191,8 @@ class FakeDiagnosis:
     def go_on(self):
         self.asked.append("go on")
 
-    def resumable(self, question):
-        return True
+    def stopped(self, question):
+        return self.left
 
     def resume(self, question):
         self.asked.append(("resume", question))
@@ -205,9 +207,10 @@ class FakeDiagnosis:
 class Room:
     """The panel with a diagnosis that only remembers, and a person at its controls."""
 
-    def __init__(self, server, data, session=None, study=None):
+    def __init__(self, server, data, session=None, study=None, measured=None):
         self.process, self.actions = FakeDiagnosis(), Actions()
-        self.page = page_context(server, session, self.actions.post, data, study, self.process)
+        page = page_context(server, session, self.actions.post, data, study, self.process)
+        self.page = replace(page, project=replace(page.project, measured=measured))
         with server.gui.add_folder("diagnosis") as place:
             self.panel = DiagnosisPanel(self.page)
         self.person = Person(place, lambda: finished(self.actions, self.page.background))
@@ -285,13 +288,33 @@ def test_an_uploaded_data_set_can_be_diagnosed(room, tmp_path):
     assert room.process.asked == [("start", Question(str(kept)))]
 
 
+def test_data_of_one_s_own_that_are_called_like_shipped_ones_stand_beside_them(room, tmp_path):
+    kept = tmp_path / "uploads" / "trefoil_2"
+    shutil.copytree(measurement_folder("trefoil_1"), kept)
+    room.show()
+    offered = room.person.options("Measured data")
+    assert len(set(offered)) == len(offered)
+    for name, data in (("trefoil_2", "trefoil_2"), ("trefoil_2 (own)", str(kept))):
+        room.person.enter("Measured data", name)
+        room.person.press(START)
+        assert room.process.asked.pop() == ("start", Question(data))
+
+
+def test_the_project_s_measured_data_are_the_first_choice(server, tmp_path):
+    room = Room(server, tmp_path, measured=tmp_path / "lot 7")
+    room.show()
+    assert room.person.options("Measured data")[0] == room.person.value("Measured data") == "lot 7 (project)"
+    room.person.press(START)
+    assert room.process.asked == [("start", Question(str(tmp_path / "lot 7")))]
+
+
 def test_effects_budget_and_queue_are_asked_for_on_the_page(room):
     person = room.person.within("Effects in question, and how much is poured")
     boxes = [name.replace("_", " ") for name in EFFECTS]
     assert person.labels[: len(boxes)] == boxes
     for label in boxes:
         person.enter(label, label in ("air drag", "twisting"))
-    person.enter("Pours (0: by itself)", 300)
+    person.enter("Pours (0: automatic)", 300)
     room.process.now = CommandStatus("running")
     room.show()
     room.person.press(QUEUE)
@@ -399,7 +422,16 @@ def test_a_diagnosis_that_goes_on_from_another_names_it_and_is_none_to_resume(tm
     arguments = json.loads((folder / "arguments.json").read_text())
     assert arguments[arguments.index("--given") + 1] == "results/first"
     # Resumed by its data's name it would be another question.
-    assert not process.resumable(Question("trefoil_1"))
+    assert process.stopped(Question("trefoil_1")) is None
+
+
+def test_a_cancelled_diagnosis_is_said_to_go_on_only_where_it_is_the_one_to_be_resumed(room):
+    process = room.process
+    for folder, said in ((process.left, True), (Path("another"), False)):
+        process.now, process.out = CommandStatus("cancelled"), folder
+        room.show()
+        assert "Cancelled. What was poured is kept" in room.person.text
+        assert ("*Resume last* goes on" in room.person.text) == said
 
 
 @pytest.mark.parametrize(("width", "folded"), [(390, True), (1200, False)])

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 from importlib.metadata import EntryPoint
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from explorer.export.liggghts import unclamped_restitution, write_liggghts
 from explorer.export.target import ExportTarget
 from explorer.scene.file import load_scene, with_settings
 from explorer.viewer.output.engine_export import programs_text
-from solver import run_pour, with_values
+from solver import run_pour, with_rig, with_values
 from solver.plugins import GROUP
 from solver.pours.record import Entries
 from solver.rigs import Revolved
@@ -107,6 +108,30 @@ def test_a_folder_is_complete_and_knows_no_other_place(engine, deck, tmp_path):
         assert str(tmp_path) not in text
         assert "/home" not in text
         assert "{" not in text or path.suffix in (".json", ".py", ".liggghts")
+
+
+@pytest.mark.parametrize("engine", [one for one in EXPORTS.values() if isinstance(one, DeckTarget)])
+def test_the_readme_calls_the_cone_a_polygon_only_where_it_is_one(engine, deck, tmp_path):
+    of_file = dataclasses.replace(
+        deck, meshes=tuple(dataclasses.replace(mesh, of_file=mesh.name == "cone") for mesh in deck.meshes)
+    )
+    for name, one, words in (
+        ("turned", deck, "    The cone is a polygon of the same area with 96 sides; bodies"),
+        ("mesh", of_file, "    The cone has the triangles of its mesh file, as here; bodies"),
+    ):
+        (tmp_path / name).mkdir()
+        engine.write_deck(tmp_path / name, one)
+        assert words in (tmp_path / name / "README.txt").read_text(encoding="utf-8")
+    assert read_deck(tmp_path / "mesh").meshes[0].of_file
+
+
+def test_the_walls_of_a_mesh_funnel_are_of_a_file_but_for_its_gate():
+    scene = with_rig(load_scene("funnel"), "mesh_funnel")
+    scene = with_settings(scene, ["insertion.protocol=fill_then_open"])
+    zero = np.zeros(0, dtype=np.int32)
+    entries = Entries(zero * 1.0, zero, zero, np.zeros((0, 3)), np.zeros((0, 4)), np.zeros((0, 3)))
+    pour = SimpleNamespace(scene=scene, seed=0, dt=1e-5, steps=1, gate_opened=0.0, entries=entries)
+    assert [(mesh.name, mesh.of_file) for mesh in deck_of(pour).meshes] == [("cone", True), ("gate", False)]
 
 
 def test_linear_springs_are_liggghts_s_model_hooke_and_nothing_of_yade_s(deck, tmp_path):

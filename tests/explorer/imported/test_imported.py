@@ -134,6 +134,34 @@ def test_edem_s_table_has_the_shear_modulus(tmp_path):
     assert "body.maize.shape" in scene.assumed
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1252", "utf-16"])
+def test_tables_and_scripts_are_read_in_whatever_characters_they_were_saved(encoding, tmp_path):
+    for program, text in (("edem", EDEM.replace("kg/m3", "kg/m³")), ("liggghts", f"# broyée\n{LIGGGHTS}")):
+        path = tmp_path / f"{program}.txt"
+        path.write_bytes(text.encode(encoding))
+        scene, _ = read_back(program, path, tmp_path)
+        assert scene.materials[0].density in (1197.0, 2500.0)
+        (tmp_path / "mine.toml").unlink()
+
+
+def test_edem_s_table_with_semicolons_has_decimal_commas(tmp_path):
+    text = EDEM.replace(",", ";").replace(".", ",")
+    scene, _ = imported("edem", text, tmp_path, "table.csv")
+    assert numbers(scene, "pair.maize.steel.restitution", "material.maize.poisson_ratio") == [0.621, 0.4]
+
+
+def test_where_there_is_one_material_bodies_and_wall_are_made_of_it(tmp_path):
+    yade = "m = FrictMat(young=1e7, label='m')\nwall(0, axis=2, material=m)\nSpherePack().makeCloud(rMean=0.01)\n"
+    liggghts = (
+        "fix m all property/global youngsModulus peratomtype 1e7\nfix w all wall/gran model hertz type 1 zplane 0\n"
+    )
+    for program, text in (("yade", yade), ("liggghts", liggghts)):
+        scene, _ = imported(program, text, tmp_path)
+        assert [body.material for body in scene.bodies] == [scene.rig.wall]
+        assert scene.material(scene.rig.wall).youngs_modulus == pytest.approx(1e7)
+        (tmp_path / "mine.toml").unlink()
+
+
 def test_what_a_file_does_not_say_is_assumed(tmp_path):
     scene, _ = imported("yade", "m = FrictMat(young=1e7)\n", tmp_path, "script.py")
     assert {"materials.m.density", "materials.m.poisson_ratio", "pair.m.m.static_friction"} <= set(scene.assumed)
@@ -221,7 +249,17 @@ def test_tables_for_edem_come_back(declared, tmp_path):
         ("yade", "FrictMat(young=open('x').read())\n", "line 1: FrictMat(young=open('x').read()): not known"),
         ("yade", "a = = 1\n", "line 1: is not Python"),
         ("yade", "FrictMat(young=1e7, poisson=0.9)\n", "poisson_ratio"),
+        (
+            "liggghts",
+            "fix p all particletemplate/multisphere 1 spheres file c.txt mass 1 inertia_tensor 1 0 0 1 0 1\n",
+            "spheres file c.txt: No such file",
+        ),
         ("edem", "maize, 1, 2\n", "says no material"),
+        (
+            "edem",
+            "Material 1,Material 2,Coefficient of Rolling Friction\na,b,0.01\n",
+            "says no material in edem's words",
+        ),
         ("edem", "Material,Shear Modulus [Pa]\nmaize,stiff\n", "maize: shear_modulus: 'stiffPa'"),
         ("edem", "Material,Shear Modulus [psi]\nmaize,3\n", "psi"),
     ],

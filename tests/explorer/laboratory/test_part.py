@@ -8,7 +8,7 @@ import pytest
 
 from doe.laboratory import analyse
 from doe.laboratory.analysis import analyse_composition, analyse_elastic
-from explorer.laboratory.part import merged, part_table, part_text, read_part, with_part
+from explorer.laboratory.part import measured_text, merged, part_table, part_text, read_part, with_part
 from solver import ParameterError, load_material, value
 from solver.assets import asset_path
 
@@ -142,6 +142,10 @@ def test_a_measured_spread_of_sizes_comes_with_a_distribution_and_no_shape(scene
         ({"materials": {"stone": {"density": 3.0}}}, "stone"),
         ({"materials": {"seed": {"youngs_modulus": 3e8, "shear_modulus": 5e7}}}, "poisson_ratio"),
         ({"materials": {"seed": {"youngs_modulus": "soft", "shear_modulus": 5e7}}}, "youngs_modulus"),
+        (
+            {"materials": {"seed": {"youngs_modulus": 1e8, "poisson_ratio": "x"}}},
+            "seed.poisson_ratio: 'x' is not a number",
+        ),
         ({"body": [{"name": "seed", "mass_fraction": 1.0}]}, "seed, plate, petiole"),
         ({"body": [{"name": n, "mass_fraction": 0.5} for n in ("seed", "plate", "petiole")]}, "add up to 1.5"),
         ({"body": [{"name": "seed", "mass_fraction": "much"}]}, "mass_fraction"),
@@ -170,6 +174,12 @@ def test_merging_keeps_both_and_the_later_of_two():
     one, other = {"a": {"x": 1, "y": 1}, "b": 1}, {"a": {"y": 2}, "c": {"z": 3}}
     assert merged(one, other) == {"a": {"x": 1, "y": 2}, "b": 1, "c": {"z": 3}}
     assert one == {"a": {"x": 1, "y": 1}, "b": 1}
+
+
+def test_dates_and_times_that_were_noted_by_hand_are_kept():
+    text = "[measured.note]\nday = 2024-01-15\nat = 08:30:00\nwhen = 2024-01-15T08:30:00+01:00\n"
+    table = tomllib.loads(text)
+    assert tomllib.loads(measured_text(table["measured"])) == table
 
 
 def test_names_that_toml_would_misread_are_quoted(tmp_path):

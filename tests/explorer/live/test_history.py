@@ -13,6 +13,7 @@ from explorer.live.messages import (
     Event,
     MovePlate,
     Pause,
+    RunTo,
     SessionState,
     SetParameters,
     SetPull,
@@ -169,6 +170,18 @@ def test_going_back_past_a_change_of_parameters_undoes_it_and_says_so(live):
         "static friction bead–steel 0.05 → 0.3"
     ]
     assert isinstance(live.reports[-1], Status)
+
+
+def test_a_pour_that_is_on_its_way_to_a_moment_runs_until_it_is_there(live):
+    live.pour.obey(RunTo(0.1))
+    assert live.pour.status().state == SessionState.RUNNING
+    while live.pour.seconds_to_wait() is not None:
+        live.pour.advance()
+    assert live.pour.status().state == SessionState.PAUSED
+    live.pour.obey(Step(0.1))
+    assert live.pour.status().state == SessionState.RUNNING
+    live.pour.obey(Pause())
+    assert live.pour.status().state == SessionState.PAUSED
 
 
 def test_a_pile_at_rest_can_be_brought_back_too(live):

@@ -65,6 +65,12 @@ def test_decimal_commas_and_other_units(tmp_path):
     assert read_balance(tmp_path / "b.csv").rate == pytest.approx(RATE, rel=1e-3)
 
 
+def test_a_row_of_decimal_commas_between_commas_is_refused(tmp_path):
+    (tmp_path / "b.csv").write_text("time_s,mass_g\n" + "".join(f"{k},0,{k},5\n" for k in range(20)))
+    with pytest.raises(CommandError, match=r"b\.csv:2: 4 cells; allowed: 2, one per column"):
+        read_balance(tmp_path / "b.csv")
+
+
 TIME = np.arange(0.0, 8.0, 0.05)
 
 

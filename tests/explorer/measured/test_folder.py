@@ -83,6 +83,32 @@ def test_a_column_of_a_table(material, tmp_path):
     assert "column not named; allowed: FILE.csv:COLUMN, one of pour, angle, by" in line
 
 
+def test_decimal_commas_of_a_column_alone_are_read_and_others_refused(material, tmp_path):
+    sheet = tmp_path / "angles.csv"
+    sheet.write_text("angle_deg\n24,1\n25,3\n", encoding="utf-8")
+    new(tmp_path / "data", "--material", material, "--angles", sheet)
+    assert values(tmp_path / "data", "A", "angle_of_repose_deg").tolist() == [24.1, 25.3]
+    sheet.write_text("pour,angle_deg\n1,24,1\n2,25,3\n", encoding="utf-8")
+    line = refused(
+        explorer("new", "measurement", tmp_path / "b", "--material", material, "--angles", f"{sheet}:angle_deg")
+    )
+    assert f"--angles {sheet}:2: 3 cells; allowed: 2" in line
+
+
+@pytest.mark.parametrize(
+    ("old", "new_", "words"),
+    [
+        ("value = 0.3, ", "", "value: missing, with an sd beside it; allowed: a number in SI"),
+        ("sd = 0.05", 'sd = "0.05"', "sd: '0.05'; allowed: a number in SI"),
+    ],
+)
+def test_a_measured_entry_changed_by_hand_is_refused_by_its_key(old, new_, words, material, tmp_path):
+    entry = "\n[measured.pair.glass.glass]\nstatic_friction = { value = 0.3, sd = 0.05 }\n"
+    material.write_text(MATERIAL + entry.replace(old, new_), encoding="utf-8")
+    line = refused(explorer("new", "measurement", tmp_path / "data", "--material", material, "--angles", "24,25"))
+    assert line == f"{material}: measured.pair.glass.glass.static_friction.{words}"
+
+
 def test_what_a_study_says_of_set_up_and_ranges_is_taken_over(tmp_path):
     assert explorer("new", "study", "lentil", "--out", tmp_path).exit_code == 0
     new(tmp_path / "data", "--study", tmp_path / "lentil_study.toml", "--angles", "24,25")
@@ -156,6 +182,14 @@ def test_times_of_a_balance_less_its_lag_are_those_of_the_flow(material, tmp_pat
     assert flow.values[:, late & away] == pytest.approx(np.tile(expected[late & away], (2, 1)), abs=RATE * LAG / np.e)
     assert "a reading every 0.02 s" in text
     assert f"lag of the balance: at most {LAG:.2g} s by the end of the curve, stated, {LAG:g} s" in text
+
+
+def test_a_lag_that_reaches_from_the_start_beyond_the_first_tenth_is_refused(material, tmp_path):
+    time = np.arange(0.0, 8.0, 0.02)
+    curve = write_balance(tmp_path / "b.csv", time, steady(time, 0.0))
+    given = ["--balance", curve, "--set", f"rig.mass={MASS}", "--starts", BEGINS, "--lag", 0.1 * LASTS + 0.01]
+    line = refused(explorer("new", "measurement", tmp_path / "data", "--material", material, *given))
+    assert line == "--lag 0.31: allowed: below 0.3 s, from the start to where a tenth of b.csv has passed"
 
 
 def test_without_a_start_a_balance_gives_the_duration_alone(material, tmp_path):
@@ -309,6 +343,18 @@ def test_a_folder_with_data_changes_as_a_whole_or_not_at_all(material, tmp_path)
     )
     line = refused(explorer("new", "study", "own", "--out", tmp_path, "--angles", "24,25"))
     assert line.endswith("belong to `new measurement`")
+
+
+def test_a_file_that_bears_the_name_of_a_new_one_is_not_overwritten(material, pictures, tmp_path):
+    folder = tmp_path / "data"
+    new(folder, "--material", material, "--angles", "24,25")
+    (folder / "images").mkdir()
+    (folder / "images/B_1.png").write_bytes(b"mine")
+    before = files(tmp_path)
+    photos = [word for one in pictures for word in ("--photo", one)]
+    line = refused(explorer("new", "measurement", folder, "--condition", "B", *photos))
+    assert line == f"--condition B: {folder / 'images/B_1.png'} is there already; allowed: a name whose files are not"
+    assert files(tmp_path) == before
 
 
 def test_what_lies_beside_the_folder_is_found_while_a_condition_is_added(material, tmp_path):

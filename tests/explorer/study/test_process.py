@@ -100,6 +100,14 @@ def test_a_study_that_fails_says_why(tmp_path):
     assert status.message == "calibrate ended with exit code 1: error: body.seed: no such body"
 
 
+def test_a_study_whose_output_was_taken_away_fails_in_one_line(tmp_path):
+    process = study(tmp_path, "pathlib.Path(f'{out}.log').unlink(); sys.exit(1)")
+    process.start("quick")
+    wait_for(lambda: process.status().state != "running")
+    log = f"{process.out}.log"
+    assert process.status().message == f"calibrate ended with exit code 1: {log}: No such file or directory"
+
+
 def test_above_the_error_limit_is_a_finished_study(tmp_path):
     process = study(tmp_path, "sys.exit(3)")
     process.start("quick")
@@ -148,6 +156,22 @@ def test_a_later_page_resumes_the_newest_study_that_has_no_result(tmp_path):
     arguments = json.loads((folder / named[0] / "arguments.json").read_text())
     assert arguments[arguments.index("--profile") + 1] == "quick"
     assert arguments[-1] == "--resume"
+
+
+def test_a_study_that_has_finished_is_not_resumed_but_the_one_that_was_stopped_before_it(tmp_path):
+    stopped = tmp_path / "out" / "my study-full-20260101-101010"
+    stopped.mkdir(parents=True)
+    process = study(tmp_path, "(out / 'result.json').touch()")
+    process.start("quick")
+    wait_for(lambda: process.status().state == "finished")
+    assert process.resumable()
+    process.resume()
+    wait_for(lambda: process.status().state == "finished")
+    arguments = json.loads((stopped / "arguments.json").read_text())
+    assert arguments[arguments.index("--profile") + 1] == "full"
+    assert not process.resumable()
+    with pytest.raises(BackgroundError, match="nothing to resume"):
+        process.resume()
 
 
 def test_a_study_that_another_page_runs_is_not_resumed(tmp_path):
@@ -278,9 +302,28 @@ def test_an_order_that_cannot_begin_waits_on_and_says_so(tmp_path, monkeypatch):
         full.setattr(study_process, "new_folder", refused)
         wait_for(lambda: process.status().state == "failed")
     assert process.waiting() == ("standard",)
+    # Whoever asks first, everybody is told, and that what waits needs another start.
+    for _ in range(2):
+        assert process.status().state == "failed"
+        assert process.status().message == (
+            "the next one cannot start: No space left on device; the queue waits for another start"
+        )
+    with pytest.raises(BackgroundError, match="nothing to try again"):
+        process.retry()
     process.start("quick")
+    assert process.status().state == "running"
     wait_for(lambda: process.status().state == "finished" and process.waiting() == ())
     assert "-standard-" in process.out.name
+
+
+def test_an_order_that_could_not_begin_is_told_no_more_when_the_queue_is_cleared(tmp_path, monkeypatch):
+    process = study(tmp_path, "time.sleep(0.3)")
+    process.start("quick")
+    process.queue("standard")
+    monkeypatch.setattr(study_process, "new_folder", lambda folder, stem: (_ for _ in ()).throw(OSError("full")))
+    wait_for(lambda: process.status().state == "failed")
+    process.clear_queue()
+    assert process.status().state == "finished"
 
 
 def test_a_changed_study_has_its_own_file_in_its_folder(tmp_path):

@@ -74,10 +74,10 @@ def page_context(server, session=None, post=None, data=Path("nowhere"), study=No
     return PageContext(server, session, post, study, diagnosis, data, bar, project, ShellChannel(), WebPages("test"))
 
 
-def page_of(server, session, diagnosis, data, channel=None):
+def page_of(server, session, diagnosis, data, channel=None, recorders=()):
     """The page of the shipped study, with results in the folder ``data``; ``channel``: that of the server."""
     study = CalibrationProcess(PROJECT.study, data / "studies", data / "runs.sqlite")
-    return Page(server, session, PROJECT, study, diagnosis, channel or ShellChannel(), WebPages("test"))
+    return Page(server, session, PROJECT, study, diagnosis, channel or ShellChannel(), WebPages("test"), recorders)
 
 
 def finished(actions: Actions, background: BackgroundWork) -> str:

@@ -8,7 +8,16 @@ from explorer.errors import CommandError
 from explorer.scene.source import differences, material_source
 from explorer.viewer.actions import Actions
 from explorer.viewer.panel import Now
-from explorer.viewer.pour.changes_panel import BACK, DEFAULT, MOST_SHOWN, REDO, UNDO, ChangesPanel, changes_html
+from explorer.viewer.pour.changes_panel import (
+    BACK,
+    DEFAULT,
+    MOST_SHOWN,
+    NO_PRESET,
+    REDO,
+    UNDO,
+    ChangesPanel,
+    changes_html,
+)
 from solver.scenes.scene import value, with_values
 from tests.explorer.viewer.page_session import PageSession, page_context
 from tests.explorer.viewer.person import Person
@@ -133,6 +142,14 @@ def test_a_bad_file_is_one_line_and_changes_nothing(bench, tmp_path):
     (tmp_path / "presets" / "bad.toml").write_text("format = 1\n[values]\n'pair.*.*.static_friction' = 'much'\n")
     assert "is not a number" in bench.person.send("Preset", "bad (own)")
     assert bench.session.asked == []
+
+
+def test_a_preset_that_is_refused_can_be_chosen_again(server, tmp_path):
+    (tmp_path / "presets").mkdir()
+    (tmp_path / "presets" / "other.toml").write_text("format = 1\n[values]\n'pair.bean.bean.static_friction' = 0.3\n")
+    person = Bench(server, tmp_path).person
+    assert "pair.bean" in person.enter("Preset", "other (own)")
+    assert person.value("Preset") == NO_PRESET
 
 
 def test_texts_of_the_list_are_escaped_and_a_long_list_is_cut():

@@ -100,7 +100,7 @@ def test_every_shipped_bench_test_is_a_choice_and_an_answer(bench):
         assert bench.enter("Test", test) == ""
         assert bench.press("Evaluate") == ""
         assert f"explorer lab {test} {test}" in bench.text
-        assert not bench.control("Take the files along").disabled
+        assert not bench.control("Download the files").disabled
 
 
 def test_the_choice_of_tests_is_the_list_of_tests_and_each_comes_with_its_examples(bench):
@@ -224,7 +224,7 @@ def test_runs_are_added_to_a_sheet_that_was_sent(design):
     design.enter("Size", "3")
     assert design.press("Make the sheet") == ""
     assert "20 rows × 1 = 20 runs" in design.text
-    assert design.press("Take the files along") == ""
+    assert design.press("Download the files") == ""
     (content,) = design.browser.sent.values()
     assert content.decode().count("24.") > 0  # results of the finished runs
 
@@ -235,7 +235,7 @@ def test_runs_are_added_to_a_sheet_that_was_sent(design):
 def test_a_sheet_is_made_for_the_spreadsheet_that_opens_it_and_comes_back_filled(design, analysis, choice, name, head):
     design.enter("Sheet as", design.options("Sheet as")[choice])
     assert design.press("Make the sheet") == ""
-    assert design.press("Take the files along") == ""
+    assert design.press("Download the files") == ""
     ((taken, content),) = design.browser.sent.items()
     assert taken == name
     assert content.startswith(head)
@@ -583,7 +583,7 @@ def test_measured_data_that_do_not_fit_are_refused_in_one_line(room):
             data.enter(LABELS[label], value)
         return data.press("Save the data")
 
-    assert "nothing was measured: give --photo" in refused()
+    assert "nothing was measured: give Angles, or Add a photograph, " in refused()
     assert "a file of them goes by the command line" in refused(angles="angles.csv")
     assert "letters, digits" in refused(angles="24,25", name="../lot")
     assert "rig.mesh: allowed: the study's own" in refused(name="lot", set_up="rig.mass=12g rig.mesh=/etc/passwd")

@@ -311,8 +311,9 @@ def test_a_mistake_in_the_program_is_not_taken_for_bad_input():
 
 def test_the_feed_rate_beside_the_sliders_is_that_of_the_pour_whoever_began_it(server):
     session = PageSession(material_source("sunflower_extract"))
+    page = page_context(server, session)
     with server.gui.add_folder("controls") as place:
-        panel = ControlsPanel(page_context(server, session))
+        panel = ControlsPanel(page)
     person, feed, path = Person(place), "Feed rate [g/s]", "insertion.rate"
     assert person.value(feed) == pytest.approx(1e3 * value(session.now.scene, path))
     # Another browser, or Set-up, pours with another feed; pouring again here keeps it.
@@ -325,3 +326,12 @@ def test_the_feed_rate_beside_the_sliders_is_that_of_the_pour_whoever_began_it(s
     person.press("Same seed")
     assert value(session.now.scene, path) == pytest.approx(0.015)
     assert session.now.seed == 2
+    # So do the timeline's button and its key.
+    for rate, ask in (
+        (12.0, lambda: page.channel.take('{"do": "restart"}')),
+        (11.0, lambda: Person(server).hit("Pour again (R)")),
+    ):
+        person.enter(feed, rate)
+        ask()
+        assert value(session.now.scene, path) == pytest.approx(1e-3 * rate)
+        assert session.now.seed == 2

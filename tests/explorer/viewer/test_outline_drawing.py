@@ -112,7 +112,8 @@ class Bench:
         with server.gui.add_folder("Silhouette") as place:
             self.panel = OutlinePanel(page)
         self.person = Person(place, lambda: finished(actions, page.background))
-        self.node = server.scene.get_handle_by_name
+        self.hasty = Person(place, actions.carry_out)  # who does not wait for what is done
+        self.background, self.node = page.background, server.scene.get_handle_by_name
 
     def text(self, outline=FRONT):
         """What stands there once the panel has looked at a pour with this outline."""
@@ -151,6 +152,25 @@ def test_a_folder_without_data_is_refused_in_one_line_and_changes_nothing(bench,
         assert "measurement.toml" in notice
         assert "\n" not in notice
         assert "measured, drum_15rpm: free surface" in bench.text()
+
+
+def test_a_choice_that_is_refused_is_set_back_to_what_is_drawn(bench):
+    person = bench.person
+    person.enter("Measured", "granudrum_mcc")
+    done = threading.Event()
+    bench.background.start("exporting", lambda: done.wait(60.0), lambda _: None)
+    assert "wait until this is done: exporting" in bench.hasty.enter("Measured", "trefoil_1")
+    assert "measured, drum_15rpm: free surface" in bench.text()
+    assert person.value("Measured") == "granudrum_mcc"
+    done.set()
+    assert person.enter("Measured", "trefoil_1") == ""
+    bench.text()
+    assert person.value("Measured") == "trefoil_1"
+    # A folder that cannot be read is no choice either.
+    person.control("Folder").value = "nowhere at all"
+    assert person.enter("Measured", OWN) != ""
+    bench.text()
+    assert person.value("Measured") == "trefoil_1"
 
 
 def test_uploaded_data_are_laid_over_the_pile_and_a_bad_archive_changes_nothing(bench):

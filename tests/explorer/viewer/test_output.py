@@ -3,6 +3,7 @@
 import io
 import math
 import re
+import threading
 import urllib.error
 import urllib.request
 import zipfile
@@ -391,6 +392,20 @@ def test_a_web_page_that_is_full_is_ended_and_written(bench, monkeypatch):
     bench.take(4)
     assert not bench.recording.running
     assert bench.finished() == ""
+    assert "__VISER_EMBED_DATA__" in bench.recording.files()[0].read_text()
+
+
+def test_a_web_page_that_cannot_be_packed_yet_goes_on_being_recorded(bench):
+    bench.recorder.enter("Kind", HTML)
+    assert bench.record(START) == ""
+    done = threading.Event()
+    bench.background.start("exporting", lambda: done.wait(60.0), lambda _: None)
+    with pytest.raises(CommandError, match="wait until this is done: exporting"):
+        bench.recording.end()
+    assert bench.recording.running
+    done.set()
+    assert bench.finished() == ""
+    assert bench.record(STOP) == ""
     assert "__VISER_EMBED_DATA__" in bench.recording.files()[0].read_text()
 
 

@@ -1,6 +1,8 @@
 """The page as a whole below the browser: one loop, all panels, another scene, a real recording."""
 
+import errno
 import json
+import shutil
 import threading
 from dataclasses import replace
 from types import SimpleNamespace
@@ -60,13 +62,13 @@ class ClosableSession(Session):
 
 
 @pytest.fixture
-def running(tmp_path, monkeypatch):
-    """A page whose loop runs in a thread, the session behind it, and a person at it."""
+def running(tmp_path, monkeypatch, request):
+    """A page whose loop runs in a thread, the session behind it, and a person at it; of a parameter: its recorders."""
     monkeypatch.setattr("explorer.viewer.page.data_folder", lambda: tmp_path)
     channel, server = ShellChannel(), guarded_server("127.0.0.1", 0, "test")
     session, stop = Session(SOURCE), threading.Event()
     diagnosis = DiagnoseProcess(tmp_path / "diagnoses", tmp_path / "runs.sqlite")
-    page = page_of(server, session, diagnosis, tmp_path, channel)
+    page = page_of(server, session, diagnosis, tmp_path, channel, getattr(request, "param", ()))
     loop = threading.Thread(target=page.run, args=(stop,))
     loop.start()
 
@@ -138,6 +140,42 @@ def test_a_recording_of_the_page_holds_the_changes(running, tmp_path):
         if "TextLog:text" in batch.schema.names:
             texts += [text for row in batch["TextLog:text"].to_pylist() for text in row or ()]
     assert f"{FRICTION}: 0.57 → 0.2" in texts
+
+
+def test_a_recording_whose_folder_is_gone_ends_in_one_line_and_the_page_goes_on(running, tmp_path):
+    pytest.importorskip("rerun")
+    session, export = running.session, running.person.within("Export")
+    session.newest = frame_of([0], [[0.0, 0.0, 0.01]])
+    export.press("Start")
+    wait_for(lambda: export.options("Record") == ("Stop",))
+    (begun,) = (tmp_path / "recordings").iterdir()
+    wait_for(lambda: str(begun) in export.text)
+    shutil.rmtree(tmp_path / "recordings")
+    session.restart()
+    session.newest = frame_of([0], [[0.0, 0.0, 0.01]], generation=2)
+    wait_for(lambda: f"there is no folder {tmp_path / 'recordings'}" in export.text)
+    wait_for(lambda: "Start" in export.options("Record"))
+
+
+class FullDisk:
+    """A recorder that cannot go on."""
+
+    asked = 0
+
+    def take(self, frame, status):
+        self.asked += 1
+        raise OSError(errno.ENOSPC, "No space left on device", "live.rrd")
+
+
+FULL_DISK = FullDisk()
+
+
+@pytest.mark.parametrize("running", [(FULL_DISK,)], indirect=True)
+def test_a_recording_of_the_command_line_that_cannot_go_on_is_left_out(running):
+    running.session.newest = frame_of([0], [[0.0, 0.0, 0.01]])
+    told = "the recording has ended: live.rrd: No space left on device"
+    wait_for(lambda: told in running.person.within("Export").text)
+    assert FULL_DISK.asked == 1
 
 
 class RestartedPage:

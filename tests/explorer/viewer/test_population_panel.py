@@ -57,12 +57,12 @@ def test_mean_spread_and_number_of_seeds_are_told():
     values = [18.8 + 6.8 * k for k in (-1.0, 0.0, 1.0)]
     assert "18.8 ± 6.8° SD (3 seeds)" in told(population(*values))
     # 1/√(2(n − 1)) = 1/2
-    assert "so few tell the SD to some 50 % only" in told(population(*values))
+    assert "the SD is known only to about ±50 %" in told(population(*values))
     assert "few" not in told(population(*values * 4))
 
 
 def test_with_no_or_one_pour_nothing_is_claimed():
-    assert "one pour tells no scatter" in told(population())
+    assert "so the scatter between pours is unknown" in told(population())
     assert "±" not in told(population())
     assert "One stored pour, 17.2°: how far seeds scatter is unknown. 2 more gave no valid pile." in told(
         population(17.2, void=2)
@@ -204,7 +204,7 @@ def test_a_single_pour_of_new_parameters_is_held_against_them_too(table):
     table.session.now = rest(table.session.now, 21.0)
     table.look()
     seen = table.look()
-    assert "one pour tells no scatter" in seen
+    assert "so the scatter between pours is unknown" in seen
     # 21 against 22 ± 2.8 over 2: t(0.975, 1) = 12.7
     assert (
         "-1.0°, 95 % -45.0 … +43.0°, against 2 former: not distinguishable in one pour; 12 pours of each would show"
@@ -230,7 +230,7 @@ def test_both_sides_of_a_change_are_poured_until_they_have_as_many(table):
     table.look()
     table.session.set_parameters({FRICTION: 0.2})
     table.look()
-    assert table.person.press("Pour 8 of each") == ""
+    assert table.person.press(POUR_BOTH) == ""
     assert table.pours.asked == [(table.session.now.scene, MORE - 3)]
     table.pours.now = CommandStatus("running", done=0, planned=5)
     table.look()
@@ -276,6 +276,6 @@ def test_cancelled_pours_of_the_one_side_are_not_followed_by_those_of_the_other(
 
 def test_what_a_comparison_lacks_is_named():
     no_former = told(population(), changed="friction 0.5 → 0.4")
-    assert "no stored pour of the former parameters; Pour 8 of each tells whether it is real." in no_former
+    assert "no stored pour of the former parameters; Pour to compare tells whether it is real." in no_former
     waits = text(population_html(population(), PILE, IDLE, "friction 0.5 → 0.4", None, population(18.0, 20.0)))
     assert "2 stored pours of the former parameters, none of these yet." in waits

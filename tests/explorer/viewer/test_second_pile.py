@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from explorer.diagnosis.piles import surface_of_revolution
+from explorer.errors import CommandError
 from explorer.live.frames import Frame
 from explorer.live.messages import SessionState, Status
 from explorer.scene.file import load_scene
@@ -114,6 +115,20 @@ def test_it_is_poured_with_the_first_one_s_scene_and_seed_and_drawn_beside_it(be
     seeds = drawn(bench.server)[f"{ROOT}/bodies/0"]
     assert seeds.batched_positions[0] == pytest.approx([0.05] * 3)
     assert drawn(bench.server)[ROOT].position[0] == BESIDE
+
+
+def test_a_second_pour_that_is_refused_leaves_the_page_as_it_was(bench, monkeypatch):
+    def refuse(scene, seed):
+        raise CommandError("rig.mass: 9 kg are too many bodies")
+
+    monkeypatch.setattr(bench.second, "start", refuse)
+    monkeypatch.setattr(bench.second, "status", lambda: pytest.fail("no pour has been started"))
+    with pytest.raises(CommandError, match="too many bodies"):
+        bench.person.press(POUR_SECOND)
+    bench.panel.draw(Now(bench.first.now))
+    bench.panel.show(Now(bench.first.now))
+    assert bench.person.html == NONE
+    assert not signs(bench.server)
 
 
 def test_it_stays_as_it_was_while_the_first_is_changed_and_the_difference_is_told(bench):

@@ -128,6 +128,12 @@ def test_a_foreign_page_has_no_channel(served, origin):
 
 
 class Moved(PageSession):
+    def play(self):
+        self.asked.append("play")
+
+    def pause(self):
+        self.asked.append("pause")
+
     def step_back(self, duration=None):
         self.asked.append(("back", duration))
 
@@ -158,6 +164,15 @@ def test_the_timeline_goes_back_to_a_moment_that_is_kept_and_no_further(at_hand)
         context.channel.take(json.dumps({"do": "seek", "time": "soon"}))
     context.channel.take(json.dumps({"do": "speed", "factor": 1000}))
     assert session.asked == [("speed", FASTEST)]
+
+
+@pytest.mark.parametrize("state", SessionState)
+def test_the_main_button_does_what_stands_on_it(at_hand, state):
+    session, context = at_hand
+    Timeline(context)
+    session.now = replace(session.now, state=state)
+    context.channel.take(json.dumps({"do": "toggle"}))
+    assert session.asked == ["pause" if timeline_state(Now(session.now), "")["playing"] else "play"]
 
 
 def test_the_timeline_shows_this_pour_s_events_up_to_now():

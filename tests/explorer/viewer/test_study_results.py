@@ -129,6 +129,17 @@ def test_a_result_from_elsewhere_is_added_and_compared(table, result, tmp_path):
     assert "name a folder" in table.others.press("Add to the list")
 
 
+def test_a_result_from_elsewhere_of_the_same_name_is_the_one_that_is_shown(table, result, tmp_path):
+    (tmp_path / "away").mkdir()
+    own, away = written(tmp_path / "study-2", result), written(tmp_path / "away" / "study-2", result)
+    table.study.done = (own,)
+    table.show()
+    table.others.enter("From a folder", str(away))
+    assert table.others.press("Add to the list") == ""
+    assert table.others.options("Result") == (PRESENT, "away/study-2", f"{tmp_path.name}/study-2")
+    assert table.others.value("Result") == "away/study-2"
+
+
 @pytest.mark.parametrize("content", ["{}", '{"study": 3}', '{"study": {"targets": []}, "screening": {"runs": 3}}'])
 def test_a_file_that_is_no_result_is_one_line(table, tmp_path, content):
     folder = tmp_path / "odd-1"

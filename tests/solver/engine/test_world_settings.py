@@ -10,7 +10,8 @@ from solver.engine.kernels.transfer import SETTINGS
 from solver.engine.tables import body_tables
 from solver.engine.world import Batch
 from solver.rigs import Funnel
-from solver.single_body.free_world import ROOM, grain_on_plate
+from solver.scenes.material import Pair
+from solver.single_body.free_world import GRAIN, ROOM, WALL, grain_on_plate, scene_of, sphere
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
@@ -60,3 +61,13 @@ def test_a_convention_of_the_contact_law_arrives_in_its_own_field(name):
     batch.load(0, scene, body_tables(scene, np.zeros(1, dtype=np.int32)), DT, (True,))
     world = batch.take(0)
     assert {one: int(world[f"world.{one}"]) for one in CONVENTIONS} == {one: int(one == name) for one in CONVENTIONS}
+
+
+def test_a_scene_of_more_contact_classes_than_the_batch_has_is_refused():
+    """Its rows of the law table would be written past the end."""
+    ball = sphere()
+    many = tuple(replace(ball, name=f"b{k}") for k in range(ROOM.kinds))
+    scene = scene_of(many, (GRAIN, WALL), (Pair("grain", "grain", 0.3, 0.5), Pair("grain", "wall", 0.3, 0.5)))
+    bodies = body_tables(scene, np.zeros(3, dtype=np.int32))
+    with pytest.raises(ValueError, match=f"{ROOM.kinds + 1} kinds do not fit into a batch of {ROOM.kinds}"):
+        Batch(ROOM).load(0, scene, bodies, DT, (True,) * len(scene.rig.surfaces()))

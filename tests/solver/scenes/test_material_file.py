@@ -60,6 +60,7 @@ def test_the_order_of_a_pair_is_free(scene):
         ("body.spheres", "many", "coarse"),
         ("insertion.region_radius", "90mm", "wider than the feed opening"),
         ("rig.mass", "nan", "not a number"),
+        ("rig.domain_half_width", "55mm", "is within the funnel; allowed: more than"),
         ("rig.mas", 1, "rig.mass"),
     ],
 )
@@ -105,7 +106,14 @@ def mutated(**changes):
         ({"pair__seed__seed__restitution": 1.5}, "restitution"),
         ({"pair__seed__seed__restitution": None}, "restitution is missing"),
         ({"pair__plate__seed": {"static_friction": 0.5, "restitution": 0.5}}, "stands twice"),
+        (
+            {"pair__seed__corn": {"static_friction": 0.5, "restitution": 0.5}},
+            "no material or body 'corn'; known: seed,",
+        ),
         ({"gravity": [0, 0]}, "gravity"),
+        ({"gravity": [0, 0, 9.81]}, r"gravity: \[0.0, 0.0, 9.81\] m/s2; allowed: down"),
+        ({"gravity": [0, 0, 0]}, "gravity"),
+        ({"gravity": [0, 0, -1e300]}, "up to 10000"),
         ({"wall": "glass"}, "glass"),
     ],
 )
@@ -141,6 +149,19 @@ def test_a_set_mass_fraction_scales_the_others(scene):
     changed = with_values(scene, {"body.seed.mass_fraction": 0.70})
     assert sum(body.mass_fraction for body in changed.bodies) == pytest.approx(1.0)
     assert changed.bodies[1].mass_fraction / changed.bodies[2].mass_fraction == pytest.approx(0.14 / 0.08)
+
+
+def test_the_rest_goes_to_the_others_though_they_had_none(scene):
+    alone = with_values(scene, {"body.seed.mass_fraction": 1.0})
+    assert [body.mass_fraction for body in alone.bodies] == [1.0, 0.0, 0.0]
+    again = with_values(alone, {"body.seed.mass_fraction": 0.6})
+    assert [body.mass_fraction for body in again.bodies] == pytest.approx([0.6, 0.2, 0.2])
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5])
+def test_a_single_component_is_all_of_the_mass(share):
+    with pytest.raises(ParameterError, match=r"body\.bead\.mass_fraction: .* there is no other component; allowed: 1"):
+        with_values(load_material("glass_beads"), {"body.bead.mass_fraction": share})
 
 
 def test_mass_is_proportional_to_density(scene):

@@ -156,3 +156,12 @@ def test_a_specimen_is_a_ball_of_the_body_s_mass():
     seed = load_material("sunflower_extract").bodies[0]
     sphere = ball(dataclasses.replace(seed))
     assert 4.0 / 3.0 * math.pi * float(sphere.clump.radii[0]) ** 3 * seed.density == pytest.approx(seed.mass)
+
+
+def test_a_set_up_effect_acts_on_a_bench_as_well():
+    """A seed stretched to twice its length, of the same volume, rebounds otherwise."""
+    settings = {"rig.name": "drop_plate_45", "rig.specimen": "body", "rig.drops": 2}
+    scene = with_settings(load_material("nine_sphere_seed"), settings)
+    stretched = with_settings(scene, {"effect.shape_elongation.elongation": 1.0})
+    one, other = (run_bench_test(each).quantity("restitution").value for each in (scene, stretched))
+    assert abs(one - other) > 1e-3
