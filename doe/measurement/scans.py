@@ -289,7 +289,7 @@ def _decimal_comma(row: str) -> bool:
 
 def _numeric(row: str) -> bool:
     try:
-        return len([float(cell) for cell in row.split()]) >= 3
+        return len([float(cell) for cell in row.split()[:3]]) == 3
     except ValueError:
         return False
 

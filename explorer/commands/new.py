@@ -88,8 +88,8 @@ def new(
     are never overwritten. From another program's input, how numbers were converted, what was not taken and what is
     assumed is told, and stands at the top of the file.
 
-    A measurement is a folder for `diagnose`: photographs, angles, a balance's curves, scans and a drum's sheet of one
-    condition, the k-th of each being of pour k. The same folder with another --condition takes one more; which one is
+    A measurement is a folder for `diagnose`: photographs, angles, a balance's curves, scans and a drum's sheet from
+    several pours of one condition, each kind in the same order of pours. The same folder with another --condition takes one more; which one is
     fitted and which held out is proposed, and what the data can tell is printed.
     """
     import shlex

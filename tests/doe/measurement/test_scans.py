@@ -195,9 +195,10 @@ def test_a_comma_is_decimal_where_something_else_divides_the_cells(tmp_path, nam
     assert 1e3 * scan.points == pytest.approx(np.round(places, 3), abs=1e-9)
 
 
-def test_commas_divide_the_cells_of_a_row_with_blanks_in_its_last_one(tmp_path):
+@pytest.mark.parametrize("head", ["x,y,z,note\n", ""])
+def test_commas_divide_the_cells_of_a_row_with_blanks_in_its_last_one(tmp_path, head):
     path = tmp_path / "scan.csv"
-    path.write_text("x,y,z,note\n" + "".join(f"{x},{y},{x * y},a note\n" for x in range(20) for y in range(20)))
+    path.write_text(head + "".join(f"{x},{y},{x * y},a note\n" for x in range(20) for y in range(20)))
     scan = read_scan(path, ScanSettings(axis=(0.0, 0.0), plate=(0.0, 0.0, 0.0)))
     assert scan.points[43].tolist() == [2.0, 3.0, 6.0]
 
