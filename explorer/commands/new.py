@@ -89,8 +89,8 @@ def new(
     assumed is told, and stands at the top of the file.
 
     A measurement is a folder for `diagnose`: photographs, angles, a balance's curves, scans and a drum's sheet from
-    several pours of one condition, each kind in the same order of pours. The same folder with another --condition takes one more; which one is
-    fitted and which held out is proposed, and what the data can tell is printed.
+    several pours of one condition, each kind in the same order of pours. The same folder with another --condition
+    takes one more; which one is fitted and which held out is proposed, and what the data can tell is printed.
     """
     import shlex
 
