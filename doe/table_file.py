@@ -73,13 +73,17 @@ def read_table(
     return csv_table(text, lambda line, what: wrong(f"{path}{place.format(line)}: {what}"), comments)
 
 
-def check_cells(table: CellTable, wrong: Callable[[int, str], Exception]) -> None:
-    """Raise ``wrong(line, what)`` for the first row that has another number of cells than the header."""
+def check_cells(table: CellTable, wrong: Callable[[int, str], Exception], short: bool = False) -> None:
+    """Raise ``wrong(line, what)`` for the first row that has another number of cells than the header.
+
+    ``short``: whether a row may have fewer.
+    """
     for line, cells in table.rows:
-        if len(cells) != len(table.rows[0][1]):
+        columns = len(table.rows[0][1])
+        if len(cells) > columns or (len(cells) < columns and not short):
             raise wrong(
                 line,
-                f"{len(cells)} cells; allowed: {len(table.rows[0][1])}, one per column (with decimal commas the cells "
+                f"{len(cells)} cells; allowed: {columns}, one per column (with decimal commas the cells "
                 "are divided by semicolons or tabs)",
             )
 

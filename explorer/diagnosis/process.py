@@ -17,11 +17,12 @@ from explorer.background.orders import BackgroundOrders, OrderedCommands
 from explorer.background.output_folder import new_folder, newest_unfinished
 from explorer.diagnosis.result import DiagnosisResult
 from solver import EFFECTS
-from solver.assets import measurement_folder
+from solver.assets import measurement_folder, shipped_measurements
 
 RESULT = DiagnosisResult.NAME
-FURTHER = "-further"
-"""Behind the data's name in that of an output folder: of a diagnosis that goes on from another one."""
+OWN, FURTHER = "-own", "-further"
+"""Behind the data's name in that of an output folder: of data that only share a shipped set's name, and of a diagnosis
+that goes on from another one."""
 
 
 @dataclass(frozen=True)
@@ -101,12 +102,12 @@ class DiagnoseProcess(OrderedCommands[Question]):
 
     def stopped(self, question: Question) -> Path | None:
         """Folder of the newest diagnosis of these data that was stopped before its end; None where none was."""
-        found = newest_unfinished(self._folder, (Path(question.data).name,), RESULT)
+        found = newest_unfinished(self._folder, (_stem(question.data),), RESULT)
         return None if found is None else found[0]
 
     def _begin(self, question: Question) -> None:
         # One that goes on from another is not resumed by its data's name; asked again, it finds its pours in the store.
-        out = new_folder(self._folder, Path(question.data).name + (FURTHER if question.given else ""))
+        out = new_folder(self._folder, _stem(question.data) + (FURTHER if question.given else ""))
         self._start(out, self._arguments(question, out))
 
     def _in_words(self, question: Question) -> str:
@@ -124,6 +125,13 @@ class DiagnoseProcess(OrderedCommands[Question]):
         given = ("--given", question.given) if question.given else ()
         asked = (*effects, *budget, *given, *store, *self._place.arguments)
         return ["diagnose", question.data, "--out", str(out), "--apply", *asked]
+
+
+def _stem(data: str) -> str:
+    """Beginning of the output folders of these data: their name, and OWN behind that of a shipped set."""
+    folder, name = Path(data).absolute(), Path(data).name
+    own = name != data and name in shipped_measurements() and folder != measurement_folder(name).absolute()
+    return name + (OWN if own else "")
 
 
 def _checked(question: Question) -> Question:

@@ -87,7 +87,7 @@ def read_balance(path: Path) -> BalanceCurve:
     table = read_table(path, MOST_BYTES, CommandError, ":{}", comments=True)
     if not table.rows:
         raise CommandError(f"{path}: no rows; allowed: columns time_s and mass_g, and readings below")
-    check_cells(table, lambda line, what: CommandError(f"{path}:{line}: {what}"))
+    check_cells(table, lambda line, what: CommandError(f"{path}:{line}: {what}"), short=True)
     time, mass = (_column(path, table, stem, units) for stem, units in (("time", TIME), ("mass", MASS)))
     if time.size < FEWEST:
         raise CommandError(f"{path}: {time.size} readings; allowed: {FEWEST} or more")
@@ -141,7 +141,8 @@ def _column(path: Path, table: CellTable, stem: str, units: dict[str, float]) ->
         )
     values = []
     for at, cells in rows:
-        values.append(table.number(cells[found[0]]))
+        cell = cells[found[0]] if found[0] < len(cells) else ""
+        values.append(table.number(cell))
         if math.isnan(values[-1]):
-            raise CommandError(f"{path}:{at}: {header[found[0]]}: {cells[found[0]][:40]!r}; allowed: a finite number")
+            raise CommandError(f"{path}:{at}: {header[found[0]]}: {cell[:40]!r}; allowed: a finite number")
     return np.array(values) * allowed[header[found[0]]]

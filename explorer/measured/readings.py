@@ -220,7 +220,7 @@ def _angles(text: str) -> list[float]:
         return _checked_angles(values, f"--angles {text}")
     path, column = _named_part(text)
     table = read_table(path, MOST_BYTES, CommandError, ":{}", comments=True)
-    check_cells(table, lambda line, what: CommandError(f"--angles {path}:{line}: {what}"))
+    check_cells(table, lambda line, what: CommandError(f"--angles {path}:{line}: {what}"), short=True)
     (line, header), *rows = table.rows or ((1, []),)
     if not column and len(header) == 1:
         column = header[0]
@@ -230,7 +230,9 @@ def _angles(text: str) -> list[float]:
             f"{', '.join(header)[:100]}"
         )
     place = header.index(column)
-    return _checked_angles([table.number(cells[place]) for _, cells in rows], f"--angles {path}: {column}")
+    return _checked_angles(
+        [table.number(cells[place] if place < len(cells) else "") for _, cells in rows], f"--angles {path}: {column}"
+    )
 
 
 def _checked_angles(values: list[float], where: str) -> list[float]:

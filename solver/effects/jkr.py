@@ -64,11 +64,12 @@ def adhere(w, c):
     if (c.overlap > 0.0 or c.before > 0.0) and pulls(k, c.reduced_radius, c.overlap):
         x = root(k, c.reduced_radius, c.overlap, c.before)
         cube = x * x * x
-        force = c.part * (c.e_star * cube * (4.0 / 3.0 * cube / c.reduced_radius - 2.0 * k))
-        # What earlier stages have made of the Hertzian force stays beside the adhesive one.
+        force = c.e_star * cube * (4.0 / 3.0 * cube / c.reduced_radius - 2.0 * k)
+        # What earlier stages have made of the Hertzian force stays beside the adhesive one, and so does the share of it
+        # that is this contact's. What adhesion adds is each contact's own, as a bridge is, and goes on at a gap.
         c.elastic += force - c.adhesive
         c.adhesive = force
-        pull_off = c.part * (1.5 * math.pi * c.work * c.reduced_radius)
+        pull_off = 1.5 * math.pi * c.work * c.reduced_radius
         more = pull_off - c.pull_off
         c.pull += 2.0 * more
         c.floor -= more

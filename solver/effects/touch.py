@@ -23,7 +23,7 @@ Touch = ti.types.struct(
     # What the stages work out
     radius=ti.f64,  # contact radius a [m]
     elastic=ti.f64,  # NORMAL, ADHESION: force without damping [N], tensile where negative
-    adhesive=ti.f64,  # the part of it that JKR sets: Hertz's force, with adhesion JKR's [N]
+    adhesive=ti.f64,  # what JKR sets: the contact law's whole force, with adhesion JKR's [N]
     work=ti.f64,  # ADHESION: work of adhesion so far [J/m²]; those of several effects add up
     pull_off=ti.f64,  # ADHESION: JKR's pull-off force in ``floor`` and ``pull`` so far [N]
     damper=ti.f64,  # NORMAL: damping force over speed [kg/s]

@@ -142,9 +142,10 @@ def outline(body: Body) -> tuple[float, ...]:
     diameter = (6.0 * body.mass / (math.pi * body.density)) ** (1.0 / 3.0)
     p = 1.6075
     surface = 4.0 * math.pi * (((a * b) ** p + (a * c) ** p + (b * c) ** p) / 3.0) ** (1.0 / p)
-    sphericity = min(1.0, math.pi * diameter**2 / surface)
+    sphericity = math.pi * diameter**2 / surface
     shown = math.sqrt(sphericity)
-    return shown * a, shown * b, shown * c, diameter, sphericity
+    # A body that is fuller than that ellipsoid has less surface than a sphere of its volume by this.
+    return shown * a, shown * b, shown * c, diameter, min(1.0, sphericity)
 
 
 @lru_cache(maxsize=32)

@@ -25,6 +25,11 @@ class RoundFeed:
     ceiling: float = math.inf
     """Nothing of a body may stick out above this height [m]."""
 
+    @property
+    def half_width(self) -> float:
+        """Largest |x| or |y| [m]."""
+        return self.radius
+
     def draw(self, reach: float, rng: np.random.Generator) -> tuple[float, float]:
         """A place (x, y) [m], uniform over the disc of radius ``reach``."""
         angle, spread = rng.uniform(0.0, 2.0 * np.pi), np.sqrt(rng.uniform())
@@ -53,6 +58,11 @@ class BoxFeed:
     half_y: float
     ceiling: float = math.inf
     """Nothing of a body may stick out above this height [m]."""
+
+    @property
+    def half_width(self) -> float:
+        """Largest |x| or |y| [m]."""
+        return max(self.half_x, self.half_y)
 
     def draw(self, reach: float, rng: np.random.Generator) -> tuple[float, float]:
         """A place (x, y) [m], uniform over the part of the opening with |x|, |y| ≤ ``reach``."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -27,6 +28,8 @@ class _SphereNumber(Parameter):
         )
 
 
+TOTAL_TOLERANCE = 1e-6
+"""By which mass fractions may miss 1 in all."""
 SPHERES = _SphereNumber(
     "body.spheres", "1", 0, 0, f"Member spheres per body; also a number, 1 … {MOST_SPHERES}.", choices=RESOLUTIONS
 )
@@ -191,7 +194,7 @@ def counts(bodies: tuple[Body, ...], mass: float) -> tuple[int, ...]:
 
 def _with_fraction(bodies: tuple[Body, ...], name: str, new: float) -> tuple[Body, ...]:
     """The other shares scale with it; where they are all zero, they share the rest equally."""
-    if len(bodies) == 1 and new != 1.0:
+    if len(bodies) == 1 and not math.isclose(new, 1.0, abs_tol=TOTAL_TOLERANCE):
         raise ParameterError(f"body.{name}.mass_fraction: {new:g}, but there is no other component; allowed: 1")
     others = sum(body.mass_fraction for body in bodies if body.name != name)
     rest = 1.0 - new

@@ -31,7 +31,7 @@ from solver.effects import EFFECTS
 from solver.laws import CONTACT_LAWS, HertzMindlin
 from solver.params import ParameterError, declared, parse_quantity
 from solver.rigs import RIGS, Funnel
-from solver.scenes.body import SPHERES, Body, Members, body_parameters
+from solver.scenes.body import SPHERES, TOTAL_TOLERANCE, Body, Members, body_parameters
 from solver.scenes.contact_model import ContactModel
 from solver.scenes.insertion import Insertion
 from solver.scenes.material import Material, Pair
@@ -213,7 +213,7 @@ def scene_from(table: dict[str, Any], path: Path) -> Scene:
     if not bodies:
         raise ParameterError("body: at least one [[body]] is needed")
     total = sum(body.mass_fraction for body in bodies)
-    if not math.isclose(total, 1.0, abs_tol=1e-6):
+    if not math.isclose(total, 1.0, abs_tol=TOTAL_TOLERANCE):
         raise ParameterError(f"body.*.mass_fraction: add up to {total:g}, not to 1")
     if len({body.name for body in bodies}) < len(bodies):
         raise ParameterError("body.name: two bodies share a name")

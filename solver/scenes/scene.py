@@ -212,10 +212,10 @@ def check(scene: Scene) -> None:
     scene.rig.check(widest_body=max(sorted(body.largest_extents)[1] for body in scene.bodies))
     if scene.rig.name in RIGS:
         rig = pour_rig(scene)
-        if rig.domain_half_width <= (radius := rig.container(0.0).radius) < math.inf:
+        if rig.domain_half_width <= (opening := rig.feed().half_width):
             raise ParameterError(
-                f"rig.domain_half_width: {rig.domain_half_width:g} m is within the {rig.name}; allowed: more than "
-                f"{radius:g} m"
+                f"rig.domain_half_width: {rig.domain_half_width:g} m ends within the feed opening; allowed: more than "
+                f"{opening:g} m"
             )
         if scene.insertion.protocol not in rig.protocols:
             allowed = ", ".join(rig.protocols)

@@ -64,8 +64,8 @@ def push_wall(s: ti.template(), w, k, point, force, couple, held):
 
 
 @ti.func
-def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, damper, mass, part):
-    """What effects see of entry ``k`` before they act."""
+def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, whole, elastic, damper, mass, part):
+    """What effects see of entry ``k`` before they act; ``whole`` [N]: what ``elastic`` is this contact's share of."""
     row = s.contact.law[w, k]
     law = s.law.row[w, row]
     scale = scale_of(s, w, k, law)
@@ -90,7 +90,7 @@ def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, da
         friction=law.friction,
         radius=a,
         elastic=elastic,
-        adhesive=elastic,
+        adhesive=whole,
         work=0.0,
         pull_off=0.0,
         damper=damper,
@@ -135,7 +135,9 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega, mass, part, sti
         elastic, damper = part * spring_force, part * damper
     touch = Touch(force=0.0)
     if ti.static(s.effects):
-        touch = touch_of(s, w, k, n, overlap, velocity, omega, contact_radius, elastic, damper, mass, part)
+        touch = touch_of(
+            s, w, k, n, overlap, velocity, omega, contact_radius, spring_force, elastic, damper, mass, part
+        )
         touch = pass_stage(s, w, k, touch, Stage.NORMAL, still)
         touch = pass_stage(s, w, k, touch, Stage.ADHESION, still)
         contact_radius, elastic, damper = touch.radius, touch.elastic, touch.damper

@@ -12,7 +12,7 @@ import pytest
 
 from explorer.background.command_process import BackgroundError, CommandStatus
 from explorer.background.events import StageProgress
-from explorer.diagnosis.process import DiagnoseProcess, Question
+from explorer.diagnosis.process import RESULT, DiagnoseProcess, Question
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.priority import BACKGROUND
 from explorer.report.content import Word
@@ -442,3 +442,16 @@ def test_the_study_panel_makes_room_for_three_piles_in_a_narrow_picture(server, 
     monkeypatch.setattr(type(page.study_panel), "minimize", lambda panel: done.append(panel))
     fold_beside_narrow(page)
     assert done == [page.study_panel] * folded
+
+
+def test_own_data_of_a_shipped_name_are_not_resumed_as_the_shipped_ones(tmp_path):
+    own = tmp_path / "uploads" / "trefoil_2"
+    shutil.copytree(measurement_folder("trefoil_2"), own)
+    process = diagnosis(tmp_path)
+    process.start(Question(str(own)))
+    wait_for(lambda: process.status().state == "finished")
+    assert process.out.name.startswith("trefoil_2-own-")
+    (process.out / RESULT).unlink()
+    assert process.stopped(Question(str(own))) == process.out
+    assert process.stopped(Question("trefoil_2")) is None
+    assert process.stopped(Question(str(measurement_folder("trefoil_2")))) is None

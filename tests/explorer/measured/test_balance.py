@@ -71,6 +71,13 @@ def test_a_row_of_decimal_commas_between_commas_is_refused(tmp_path):
         read_balance(tmp_path / "b.csv")
 
 
+def test_a_row_may_leave_out_its_remark(tmp_path):
+    time = np.arange(0.0, 8.0, 0.05)
+    rows = "".join(f"{t:.2f},{m:.7f}\n" for t, m in zip(time, steady(time), strict=True))
+    (tmp_path / "b.csv").write_text("time_s,mass_kg,remark\n" + rows)
+    assert read_balance(tmp_path / "b.csv").rate == pytest.approx(RATE, rel=1e-3)
+
+
 TIME = np.arange(0.0, 8.0, 0.05)
 
 

@@ -124,6 +124,20 @@ def test_adhesion_vanishes_for_contacts_that_share_their_stiffness():
     assert landed("local_mass_shared", faint) == pytest.approx(landed("local_mass_shared"), abs=1e-3)
 
 
+def test_adhesion_goes_on_where_surfaces_that_share_their_stiffness_come_apart():
+    """The force of the plane on a slab of 25 spheres an atom's width on either side of touching."""
+    scene = with_effects(grain_on_plate(slab(), friction=0.0), EFFECTS["adhesion_jkr"](1.0))
+    rule = dataclasses.replace(scene.contact, clump_rule="local_mass_shared")
+    lab = FreeWorld(dataclasses.replace(scene, contact=rule), 1)
+    forces = []
+    for overlap in (1e-8, 1e-10, -1e-10):
+        lab.put(0, (0.0, 0.0, RADIUS - overlap))
+        lab.run(1)
+        forces.append(lab.batch.contacts(0)[:, 10].sum())
+    assert forces[1] < -0.1
+    assert forces[2] == pytest.approx(forces[1], rel=1e-3)
+
+
 def test_a_plastic_contact_gives_the_same_back_where_contacts_share():
     """e² = (1 − 5/2 λ + 3/2 λ^{5/3})/(1 − λ), at any stiffness."""
     share = 0.5

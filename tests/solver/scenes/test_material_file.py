@@ -1,6 +1,7 @@
 """Material files and parameter paths: what is read, and one clear line for whatever is wrong."""
 
 import copy
+import dataclasses
 import tomllib
 
 import pytest
@@ -9,7 +10,7 @@ from solver.assets import asset_path
 from solver.params import ParameterError, parse_quantity
 from solver.scenes.body import counts
 from solver.scenes.material_file import load_material, scene_from
-from solver.scenes.scene import canonical, parameters, value, with_values
+from solver.scenes.scene import canonical, parameters, value, with_rig, with_values
 
 PATH = asset_path("materials", "sunflower_extract")
 TABLE = tomllib.loads(PATH.read_text())
@@ -60,7 +61,7 @@ def test_the_order_of_a_pair_is_free(scene):
         ("body.spheres", "many", "coarse"),
         ("insertion.region_radius", "90mm", "wider than the feed opening"),
         ("rig.mass", "nan", "not a number"),
-        ("rig.domain_half_width", "55mm", "is within the funnel; allowed: more than"),
+        ("rig.domain_half_width", "55mm", "ends within the feed opening; allowed: more than 0.057"),
         ("rig.mas", 1, "rig.mass"),
     ],
 )
@@ -162,6 +163,22 @@ def test_the_rest_goes_to_the_others_though_they_had_none(scene):
 def test_a_single_component_is_all_of_the_mass(share):
     with pytest.raises(ParameterError, match=r"body\.bead\.mass_fraction: .* there is no other component; allowed: 1"):
         with_values(load_material("glass_beads"), {"body.bead.mass_fraction": share})
+
+
+def test_a_share_that_misses_1_by_what_a_file_may_is_1():
+    scene = load_material("glass_beads")
+    bodies = (dataclasses.replace(scene.bodies[0], mass_fraction=1.0 - 1e-7),)
+    assert (
+        with_values(dataclasses.replace(scene, bodies=bodies), {"body.bead.mass_fraction": 1.0 - 1e-7}).bodies == bodies
+    )
+
+
+def test_a_box_may_reach_to_the_corners_of_its_domain():
+    boxed = with_rig(load_material("glass_beads"), "draw_down_box")
+    changed = {"rig.width": 0.1, "rig.depth": 0.1, "rig.domain_half_width": 0.06}
+    assert with_values(boxed, changed).rig.domain_half_width == 0.06
+    with pytest.raises(ParameterError, match="ends within the feed opening; allowed: more than"):
+        with_values(boxed, changed | {"rig.domain_half_width": 0.05})
 
 
 def test_mass_is_proportional_to_density(scene):
