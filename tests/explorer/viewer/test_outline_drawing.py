@@ -114,6 +114,7 @@ class Bench:
         self.person = Person(place, lambda: finished(actions, page.background))
         self.hasty = Person(place, actions.carry_out)  # who does not wait for what is done
         self.background, self.node = page.background, server.scene.get_handle_by_name
+        self.wait = lambda: finished(actions, page.background)
 
     def text(self, outline=FRONT):
         """What stands there once the panel has looked at a pour with this outline."""
@@ -163,6 +164,7 @@ def test_a_choice_that_is_refused_is_set_back_to_what_is_drawn(bench):
     assert "measured, drum_15rpm: free surface" in bench.text()
     assert person.value("Measured") == "granudrum_mcc"
     done.set()
+    bench.wait()
     assert person.enter("Measured", "trefoil_1") == ""
     bench.text()
     assert person.value("Measured") == "trefoil_1"
