@@ -158,8 +158,12 @@ def _spheres(file: Path, where: str, after: Callable[[str, int], list[str]]) -> 
     """Rows x, y, z, r of a clump, in the script or in a file beside it."""
     texts, scale = after("spheres", 2), 1.0
     if texts[:1] == ["file"]:
+        beside = (file.parent / texts[1]).resolve()
+        # A script that somebody sent must not have the page read any other file.
+        if not beside.is_relative_to(file.parent.resolve()):
+            raise CommandError(f"{file}: {where}: spheres file {texts[1]}; allowed: a file beside the script")
         try:
-            texts = text_of(file.parent / texts[1]).split()
+            texts = text_of(beside).split()
         except OSError as error:
             raise CommandError(f"{file}: {where}: spheres file {texts[1]}: {error.strerror}") from None
         scale = _float(file, where, (after("scale", 1) or ["1"])[0])

@@ -51,7 +51,8 @@ class ComparisonPanel:
         elif not isinstance(self._result, StudyResult):
             text = NOT_YET
         else:
-            text = comparison_markdown(self._result, other, (self._name, title(folder)))
+            name = title(folder) if title(folder) != self._name else f"{folder.parent.name}/{folder.name}"
+            text = comparison_markdown(self._result, other, (self._name, name))
         if self._words.content != text:
             self._words.content = text
 

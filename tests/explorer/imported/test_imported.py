@@ -254,6 +254,11 @@ def test_tables_for_edem_come_back(declared, tmp_path):
             "fix p all particletemplate/multisphere 1 spheres file c.txt mass 1 inertia_tensor 1 0 0 1 0 1\n",
             "spheres file c.txt: No such file",
         ),
+        (
+            "liggghts",
+            "fix p all particletemplate/multisphere 1 spheres file /etc/passwd mass 1 inertia_tensor 1 0 0 1 0 1\n",
+            "spheres file /etc/passwd; allowed: a file beside the script",
+        ),
         ("edem", "maize, 1, 2\n", "says no material"),
         (
             "edem",
