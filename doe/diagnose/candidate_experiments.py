@@ -9,7 +9,7 @@ regression and the axis of a scan leave open is in the covariance.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
@@ -109,7 +109,7 @@ def next_experiment(
         return CandidateExperiments((), 0)
     directed = {way.effect for way in training.ways if way.angle is not None}
     turned = any(name in directed for label in weights for name in label.split("+"))
-    changes = {change.named(turned): values for change, values in feasible(condition.scene)}
+    changes = {change.named(turned): values for change, values in feasible(condition.scene, training.calibrated)}
     set_ups = [changed(condition, name, values, turned) for name, values in changes.items()]
     # What is measured there is weighed by all effects.
     set_ups = [one for one in set_ups if training.possible_in(one.scene)]
@@ -219,14 +219,17 @@ def as_suggested(condition: Condition, asked: Suggestion) -> Condition:
     return changed(condition, asked.experiment.name, asked.values, asked.turned)
 
 
-def feasible(scene: Scene) -> list[tuple[Change, dict[str, float | str]]]:
-    """The changes that the rig of ``scene`` can do, with the values [SI] that they come to."""
+def feasible(scene: Scene, calibrated: Collection[str] = ()) -> list[tuple[Change, dict[str, float | str]]]:
+    """The changes that the rig of ``scene`` can do, with the values [SI] that they come to.
+
+    None of what is ``calibrated``: every pour sets that by itself.
+    """
     found = []
-    known = parameters(scene)
+    known = set(parameters(scene)) - set(calibrated)
     for change in CHANGES:
         if "insertion.protocol" in change.choices and scene.numerics.duration > 0.0:
             continue  # filled first, it would be read before it has run out
-        if not (set(change.factors) | set(change.choices)) <= set(known):
+        if not set(change.factors) | set(change.choices) <= known:
             continue
         values: dict[str, float | str] = {path: f * float(value(scene, path)) for path, f in change.factors.items()}
         values |= change.choices

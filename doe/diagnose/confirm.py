@@ -119,6 +119,8 @@ def held_out(label: str, data: Sequence[HeldOutData], poured: Sequence[FloatArra
         spread = np.maximum(pooled_deviation(one.measured, block), floor)
         off = np.abs(one.measured.mean(axis=0) - block.mean(axis=0))
         varies = spread > 0.0
+        if not varies.any():
+            continue
         asked += int(varies.sum())
         t = np.where(varies, off / np.where(varies, spread, 1.0), 0.0) / np.sqrt(1 / len(one.measured) + 1 / len(block))
         k = int(t.argmax())

@@ -208,7 +208,7 @@ def concluded(
 
 def fresh_pours(conditions: Sequence[Condition]) -> int:
     """Pours per model and condition in the confirmation."""
-    return max(FRESH, *(condition.replicates for condition in conditions))
+    return max([FRESH, *(condition.replicates for condition in conditions)])
 
 
 def odds(found: Posterior) -> str:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from doe.declared.model import Declared
 from doe.declared.points import Direction, Point
 from doe.declared.pours import Rows, Search
-from doe.diagnose.compared_features import usable
+from doe.diagnose.compared_features import READABLE, usable
 from doe.diagnose.emulator import Lessons, Way, emulated
 from doe.diagnose.result import Level
 
@@ -73,11 +73,13 @@ def whitened_shift(declared: Declared, base: Rows, moved: Rows) -> float:
     """Distance of the mean summaries of two sets of pours in standard errors of ``REPLICATES`` pours, all conditions.
 
     Less what noise alone adds to its square on average. The covariance is that of ``base``, shrunk halfway to its
-    diagonal (they are few). Pours that broke off are left out. Infinite if a condition has no pour of ``moved`` left.
+    diagonal (they are few). Pours that broke off are left out, and summaries that less than ``READABLE`` of ``base``
+    give. Infinite if a condition has no pour of ``moved`` left.
     """
     square = 0.0
     for c in range(len(declared.conditions)):
-        still, there = _valid(base, c), _valid(moved, c)
+        given = np.isfinite([row[c].summaries for row in base if row[c].valid]).mean(axis=0) >= READABLE
+        still, there = _valid(base, c, given), _valid(moved, c, given)
         if len(there) == 0:
             return math.inf
         spread = still.std(axis=0, ddof=1)
@@ -108,7 +110,8 @@ def taught_shifts(lessons: Lessons, ways: Sequence[Way]) -> FloatArray:
     return shifts
 
 
-def _valid(pours: Rows, condition: int) -> FloatArray:
-    rows = [row[condition].summaries for row in pours if row[condition].valid]
+def _valid(pours: Rows, condition: int, given: npt.NDArray[np.bool_]) -> FloatArray:
+    """The summaries ``given`` of the pours that have them all."""
+    rows = [np.asarray(row[condition].summaries)[given] for row in pours if row[condition].valid]
     complete = [row for row in rows if np.isfinite(row).all()]
-    return np.array(complete) if complete else np.empty((0, 0))
+    return np.array(complete).reshape(len(complete), int(given.sum()))

@@ -121,6 +121,11 @@ class TrainingPours:
         )
 
     @property
+    def calibrated(self) -> frozenset[str]:
+        """Paths of the calibrated parameters."""
+        return frozenset(one.name for one in self._declared.parameters)
+
+    @property
     def settings(self) -> int:
         """Settings poured so far."""
         return len({point.seen(AS_IT_IS) for point in self._rows})

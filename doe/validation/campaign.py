@@ -100,8 +100,8 @@ def run_campaign(order: CampaignOrder, say: Say, listener: CampaignListener | No
     order.out.mkdir(parents=True, exist_ok=True)
     path, laboratory = order.out / SETS, read_laboratory(order.laboratory)
     title, asked = laboratory.declared.title, order.asked(laboratory)
-    known = {(row.root, row.number) for row in read_rows(path) if row.laboratory == title}
-    todo = [case for case in asked if case.seed not in known]
+    known = {(row.root, row.number, row.offer) for row in read_rows(path) if row.laboratory == title}
+    todo = [case for case in asked if not known.issuperset((*case.seed, offer) for offer in OFFERS)]
     say(f"{path}: {len(asked) - len(todo)} of {len(asked)} data sets are there")
     deadline = time.monotonic() + 60.0 * order.minutes
     if todo and order.minutes > 0.0:
@@ -221,8 +221,8 @@ class Answers:
             suggestion = next(iter(candidates.suggestions), None)
         best, best_p = found.best
         label = label_of(truth)
-        named = {frozenset(name.split("+")) for name in verdict.names}
-        right = verdict.kind.startswith("effect") and named == {frozenset(label.split("+"))}
+        true, named = frozenset(label.split("+")), {frozenset(name.split("+")) for name in verdict.names}
+        right = verdict.kind.startswith("effect") and named == {true}
         errors = errors_of(measurement.holdout, "holdout", conclusion) if right else ()
         before, after = (errors[-1].before / errors[-1].noise_floor, errors[-1].ratio) if errors else (NAN, NAN)
         theta = declared.theta(truth.theta)
@@ -243,7 +243,7 @@ class Answers:
             outside=found.outside,
             best=best,
             best_p=best_p,
-            truth_p=found.effects.get(label, NAN),
+            truth_p=next((p for name, p in found.effects.items() if frozenset(name.split("+")) == true), NAN),
             evidence={name: fit.log_evidence for name, fit in found.fits.items() if "+" not in name or name == best}
             | {"outside": found.log_outside},
             fits={name: found.fits[name].p for name in dict.fromkeys(("base", best))},

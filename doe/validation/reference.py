@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -174,8 +175,9 @@ def extended(found: Reference, declared: Declared, pours: ModelPours) -> Referen
             complete = [one for one in features if np.isfinite(one).all()]
             known = found.sample.pours[kind][c : c + 1] if kind in found.sample.pours else ()
             # Kept in single precision, so that a reference is the same whether it was made at once or in pieces.
-            blocks.append(np.concatenate([*known, np.array(complete, dtype=np.float32).reshape(len(complete), -1)]))
-        sample[kind] = tuple(block.reshape(len(block), -1) for block in blocks)
+            shape = len(complete), len(found.features[c])
+            blocks.append(np.concatenate([*known, np.array(complete, dtype=np.float32).reshape(shape)]))
+        sample[kind] = tuple(blocks)
     parameters = tuple(parameter.name for parameter in declared.parameters)
     return replace(found, rounds=found.rounds + 1, sample=ReferencePours(sample, parameters))
 
@@ -223,7 +225,8 @@ def save(found: Reference, path: Path) -> None:
         arrays |= {f"{k}_{c}": block.astype(np.float32) for c, block in enumerate(blocks)}
     buffer = io.BytesIO()
     np.savez_compressed(buffer, allow_pickle=False, **arrays)
-    part = path.with_name(path.name + ".part")
+    # Two shards of a campaign may write at once.
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")
     part.write_bytes(buffer.getvalue())
     part.replace(path)
 

@@ -26,6 +26,7 @@ from scipy.special import logsumexp
 
 from doe.diagnose.posterior import priors_of
 from doe.diagnose.verdict import THRESHOLD
+from doe.errors import StatisticsError
 from doe.measurement.features import SCAN
 from doe.record import Record
 
@@ -144,9 +145,15 @@ class SetRow(Record):
         return frozenset(self.label.split("+")) if self.kind in ("effect", "pair") else frozenset()
 
     @property
+    def best_is_true(self) -> bool:
+        """Whether the most probable effect is the truth; the two of a pair in any order."""
+        return frozenset(self.best.split("+")) == self.truth
+
+    @property
     def true_p(self) -> float:
         """Probability that was given to what is true; 0 where it was not weighed."""
-        p = {"null": self.nothing, "outside": self.outside}.get(self.kind, self.truth_p)
+        of_effect = self.best_p if self.best_is_true else self.truth_p
+        p = {"null": self.nothing, "outside": self.outside}.get(self.kind, of_effect)
         return p if math.isfinite(p) else 0.0
 
 
@@ -254,16 +261,31 @@ def answer_to(verdict: str, label: str) -> Answer:
 
 
 def read_rows(path: Path) -> list[SetRow]:
-    """Rows in ``path``, in order of numbers and kinds of data; none where there is no such file."""
+    """Rows in ``path``, in order of numbers and kinds of data; none where there is no such file.
+
+    A line that was cut off with the process that wrote it is passed over, and of a set that was judged twice the last
+    row counts. Raises StatisticsError for any other line that is no row.
+    """
     if not path.is_file():
         return []
-    rows = [_row(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
-    return sorted(rows, key=lambda row: (row.laboratory, row.root, row.number, row.offer))
+    rows: dict[tuple[str, int, int, str], SetRow] = {}
+    for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
+        if not line.rstrip().endswith("}"):
+            continue
+        try:
+            row = _row(json.loads(line))
+        except (ValueError, TypeError, AttributeError) as error:
+            raise StatisticsError(f"{path}: line {number}: {error}; allowed: a row of a campaign") from None
+        rows[row.laboratory, row.root, row.number, row.offer] = row
+    return [rows[key] for key in sorted(rows)]
 
 
 def append_rows(path: Path, rows: Sequence[SetRow]) -> None:
     """Add ``rows`` to the file, in one write, so that processes that share it do not mix lines."""
     text = "".join(json.dumps(_rounded(row.to_dict()), ensure_ascii=False) + "\n" for row in rows)
+    last = path.read_bytes()[-1:] if path.is_file() else b""
+    if last not in (b"", b"\n"):  # behind a line that was cut off
+        text = "\n" + text
     with path.open("a", encoding="utf-8") as file:
         file.write(text)
 
@@ -384,14 +406,14 @@ def _top(row: SetRow) -> tuple[float, bool]:
     """Probability of the most probable answer, and whether it is true."""
     answers = {"base": row.nothing, "outside": row.outside, row.best: row.best_p}
     best = max(answers, key=lambda name: answers[name])
-    return answers[best], best == _truth(row)
+    return answers[best], row.best_is_true if best == row.best else best == _truth(row)
 
 
 def _covered(rows: Sequence[SetRow], risk: float) -> int:
     """Right names at the lowest threshold at which at most a share ``risk`` of ``rows`` get a wrong one."""
     most, right, wrong, covered = risk * len(rows), 0, 0, 0
     for row in sorted(rows, key=lambda row: -row.best_p):
-        right, wrong = (right + 1, wrong) if row.best == row.label else (right, wrong + 1)
+        right, wrong = (right + 1, wrong) if row.best_is_true else (right, wrong + 1)
         if wrong > most:
             break
         covered = right

@@ -42,7 +42,7 @@ from explorer.report.diagnosis.answer import banner as diagnosis_banner
 from explorer.report.diagnosis.wording import feature_label, feature_value
 from explorer.report.sections.answer import banner as study_banner
 from explorer.scene.meshes import PLATE_NAME, Triangles, rig_triangles, scene_height
-from explorer.study.runs import scene_of
+from explorer.study.run_scene import scene_of
 from explorer.units import observable_label, observed
 from explorer.viewer.palette import BODY_COLOURS, MEASURED, STILL
 from solver import Job, Record, Scene, run_pours

@@ -19,7 +19,7 @@ from explorer.report.figures.pours import outlines_caption, pile_outlines
 from explorer.report.identified import settings
 from explorer.report.sections.answer import banner
 from explorer.report.study_charts import Plot, Plots, study_plots
-from explorer.study.runs import observed_of, stages_with_runs
+from explorer.study.run_scene import observed_of, stages_with_runs
 from explorer.units import enumeration, number, observable_label
 from explorer.viewer.board.board import Board, BoardTable, Stage, made_charts
 from explorer.viewer.study.process_view import AT_WORK, DONE, TO_COME, time_left

@@ -20,7 +20,7 @@ from explorer.photograph.target import PhotographedTarget
 from explorer.study.duration import duration_text
 from explorer.study.excluded_runs import keep_excluded, load_excluded
 from explorer.study.process import PARTIAL, RESULT, QueuedStudy
-from explorer.study.runs import scene_of
+from explorer.study.run_scene import scene_of
 from explorer.units import observable_label, observed
 from explorer.viewer.board.board_view import BoardView
 from explorer.viewer.board.study_board import listed_runs, photographed_of, study_board

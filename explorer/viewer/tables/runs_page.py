@@ -9,7 +9,7 @@ from doe.studies.exclusion import ExcludedRun
 from doe.studies.study_result import StudyResult
 from explorer.errors import CommandError
 from explorer.outcomes import outcome_text
-from explorer.study.runs import observed_of
+from explorer.study.run_scene import observed_of
 from explorer.units import number, observable_label, unit_of_parameter
 from explorer.viewer.actions import Action, Post
 from explorer.viewer.tables.grid import WRITTEN, column, entered_text, table_heading, table_to_edit, with_unit

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from doe.diagnose.confirm import Confirmed, confirming, residual_maps
+from doe.diagnose.confirm import CONTRADICTED, Confirmed, HeldOutData, confirming, held_out, residual_maps
 from doe.diagnose.result import CalibratedModel
 from doe.measurement import load_measurement
 from doe.measurement.piles import PileSurface
@@ -81,3 +81,13 @@ def test_the_points_that_confirm_are_those_that_were_poured():
     assert [(one.sequence, one.number, one.theta, one.effects) for one in points] == [
         ("confirm 2", k, (1.0,), (("air_drag", (0.5,)),)) for k in range(2)
     ]
+
+
+def test_held_out_numbers_that_are_zero_in_every_pour_contradict_nothing():
+    empty = HeldOutData("empty", ("residual_mass_kg",), np.zeros((3, 1)))
+    assert held_out("base", [empty], [np.zeros((8, 1))]) is None
+    off = HeldOutData("off", ("height",), np.array([[5.0], [5.1], [4.9]]))
+    found = held_out("base", [empty, off], [np.zeros((8, 1)), np.linspace(-0.1, 0.1, 8)[:, None]])
+    assert found is not None
+    assert found.condition == "off"
+    assert found.p < CONTRADICTED

@@ -486,3 +486,32 @@ def test_data_without_a_readable_replicate_have_no_error_row(measurement):
     confirmed = diagnosis.Confirmed(model, tuple(np.zeros((0, width)) for width in widths), 12)
     conclusion = diagnosis.Conclusion(confirmed, confirmed, None)
     assert diagnosis.errors_of(measurement.conditions, "holdout", conclusion) == ()
+
+
+def test_without_held_out_conditions_nothing_is_confirmed_or_taken_back(measurement, monkeypatch):
+    measure(monkeypatch, (), seed=1)
+    declared = declare(measurement, NAMES[:1])
+    training = TrainingPours(declared, measurement.fit, FormulaPours(measurement.fit, (), None, None), BUDGET, print)
+    compared = diagnosis.pursued(training, measurement.fit, BUDGET, print)
+    verdict = diagnosis.verdict_of(compared, declared, training.pours, False)
+    conclusion, after = diagnosis.concluded(verdict, compared, declared, (), FormulaPours((), (), None, None), print)
+    assert after == verdict
+    assert conclusion.held_out is None
+    assert diagnosis.errors_of((), "holdout", conclusion) == ()
+
+
+def test_a_summary_that_the_base_model_does_not_give_leaves_the_shift_as_it_is(measurement):
+    declared = declare(measurement, NAMES)
+    rng, width = np.random.default_rng(2), len(declared.conditions[0].summaries)
+
+    def pours(rows, last):
+        numbers = [(*row[:-1], x) for row, x in zip(rows, last, strict=True)]
+        return [[PointPour(one, "measured")] * len(declared.conditions) for one in numbers]
+
+    base, there = rng.normal(size=(24, width)), rng.normal(size=(6, width)) + 2.0
+    # That number is the same in all pours, and so says nothing.
+    wanted = whitened_shift(declared, pours(base, [0.0] * 24), pours(there, [0.0] * 6))
+    for gap, now in ((math.nan, math.nan), (math.nan, 1.0)):
+        assert whitened_shift(declared, pours(base, [gap] * 24), pours(there, [now] * 6)) == pytest.approx(wanted)
+    one = [0.0, *[math.nan] * 23]
+    assert whitened_shift(declared, pours(base, one), pours(there, [math.nan] * 6)) == pytest.approx(wanted)

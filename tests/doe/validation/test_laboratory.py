@@ -14,10 +14,11 @@ from doe.measurement import load_measurement
 from doe.measurement.condition_table import in_rig
 from doe.measurement.features import SCALARS, SCAN, features_of_data, offer_of
 from doe.store import Store
-from doe.validation.campaign import Answers
+from doe.validation.campaign import OFFERS, SETS, Answers, CampaignOrder, run_campaign
 from doe.validation.laboratory import TREFOILS, read_laboratory
 from doe.validation.outside import OUTSIDE_EFFECTS, possible_outside
 from doe.validation.scanner import Scanner
+from doe.validation.sets import SetRow, append_rows
 from doe.validation.truth import REPLICATES, Case, Truth
 from doe.validation.work_place import WorkPlace
 from solver import AssetNotFoundError
@@ -118,3 +119,23 @@ def test_outside_effects_are_those_that_there_can_be():
     assert possible_outside(scene) == tuple(OUTSIDE_EFFECTS)
     cylinder = in_rig(scene, "lifting_cylinder")
     assert set(OUTSIDE_EFFECTS) - set(possible_outside(cylinder)) == {"sticky_funnel", "draught", "raised_funnel"}
+
+
+def test_a_set_is_there_once_it_is_judged_by_every_kind_of_data(tmp_path):
+    title, said = read_laboratory(TREFOILS).declared.title, []
+    order = CampaignOrder(tmp_path, 1, minutes=0.0, cases=(Case(9, 0, "null"),))
+    for offer in OFFERS:
+        found = SetRow(
+            laboratory=title,
+            root=9,
+            number=0,
+            kind="null",
+            label="none",
+            strength=float("nan"),
+            amplitude="",
+            offer=offer,
+            verdict="no_missing_effect",
+        )
+        append_rows(tmp_path / SETS, [found])
+        run_campaign(order, said.append)
+    assert [line.partition(": ")[2] for line in said] == ["0 of 1 data sets are there", "1 of 1 data sets are there"]

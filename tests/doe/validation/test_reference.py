@@ -1,6 +1,7 @@
 """Reference pours: rounds that add up, and the file that keeps them."""
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -87,6 +88,39 @@ def test_what_came_to_no_end_or_cannot_be_read_is_left_out():
     counted = sum(k % 7 != 6 and k % 11 != 10 for k in range(number))
     assert [len(block) for block in found.sample.pours["push strong"]] == [counted] * 2
     assert [block.shape[1] for block in found.sample.pours["base"]] == [2, 3]
+
+
+def test_a_kind_whose_pours_all_jam_has_no_pours(tmp_path):
+    class Jammed(Poured):
+        def run(self, what, points):
+            pours = super().run(what, points)
+            jams = [dict(point.effects).get("push") == (1.0,) for point in points]
+            return [
+                [dataclasses.replace(one, outcome="jammed") for one in row] if jam else row
+                for row, jam in zip(pours, jams, strict=True)
+            ]
+
+    found = rounds(2, Jammed())
+    assert [block.shape for block in found.sample.pours["push strong"]] == [(0, 2), (0, 3)]
+    save(found, tmp_path / "reference.npz")
+    again = extended(load(tmp_path / "reference.npz"), DECLARED, Poured())
+    assert all(len(block) > 0 for block in again.sample.pours["push strong"])
+
+
+def test_two_processes_that_write_at_once_both_end(tmp_path, monkeypatch):
+    path, found, both = tmp_path / "reference.npz", rounds(1), iter((True, False))
+    replace = Path.replace
+
+    def meanwhile(part, target):
+        if next(both):
+            monkeypatch.setattr("os.getpid", lambda: -1)
+            save(found, path)
+        return replace(part, target)
+
+    monkeypatch.setattr(Path, "replace", meanwhile)
+    save(found, path)
+    assert load(path).rounds == 1
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_file_gives_back_what_was_written_and_can_be_gone_on_with(tmp_path):

@@ -10,6 +10,7 @@ from statsmodels.stats.proportion import proportion_confint
 
 from doe.diagnose.posterior import NOTHING, OUTSIDE, PAIRS
 from doe.diagnose.verdict import THRESHOLD
+from doe.errors import StatisticsError
 from doe.validation.sets import (
     LEAST_P,
     TEMPERATURES,
@@ -104,6 +105,24 @@ def test_rows_come_back_as_they_were_written(tmp_path):
         assert json.loads(line)["root"] == 5
 
 
+def test_a_line_that_was_cut_off_is_passed_over_and_its_set_can_be_judged_again(tmp_path):
+    path, rows = tmp_path / "sets.jsonl", [row(k, "null", "none", "no_missing_effect") for k in (1, 2)]
+    append_rows(path, rows)
+    path.write_text(path.read_text()[:-30])
+    assert [one.number for one in read_rows(path)] == [1]
+    append_rows(path, rows)
+    assert [str(one) for one in read_rows(path)] == [str(one) for one in rows]
+
+
+@pytest.mark.parametrize("line", ['{"root": 1}', '{"root": }', '{"other": 1, "laboratory": "a"}'])
+def test_a_line_that_is_no_row_is_refused_in_one_line(tmp_path, line):
+    path = tmp_path / "sets.jsonl"
+    append_rows(path, [row(1, "null", "none", "no_missing_effect")])
+    path.write_text(path.read_text() + line + "\n")
+    with pytest.raises(StatisticsError, match=r"sets\.jsonl: line 2: .*; allowed: a row of a campaign"):
+        read_rows(path)
+
+
 def judged(number, kind, label, verdict, best, best_p, nothing=0.0, outside=0.0, truth_p=NAN):
     one = row(number, kind, label, verdict, 6.0)
     return replace(one, best=best, best_p=best_p, nothing=nothing, outside=outside, truth_p=truth_p)
@@ -127,6 +146,13 @@ def test_scores_by_hand():
     assert [(one.right.hits, one.right.sets) for one in found.reliability] == [(0, 0), (0, 1), (2, 2), (1, 2), (1, 1)]
     # a and b named rightly, and one of the pair: 3 of the 5 that act.
     assert found.f1 == pytest.approx(2 * 3 / (2 * 3 + 2))
+
+
+def test_the_two_of_a_pair_are_right_in_any_order():
+    found = scores([judged(0, "pair", "a+b", "effects:b+a", "b+a", 0.95)])
+    assert found.log_loss == pytest.approx(-math.log(0.95))
+    assert [rate.hits for rate in found.coverage] == [1, 1, 1]
+    assert [one.right.hits for one in found.reliability if one.right.sets] == [1]
 
 
 def weighed(number, kind, label, **evidence):

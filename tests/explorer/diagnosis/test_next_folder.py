@@ -117,6 +117,13 @@ def test_what_is_read_after_a_stated_time_is_not_filled_first(measured):
     assert SHUT in {change.name for change, _ in feasible(with_values(scene, {"numerics.duration": 0.0}))}
 
 
+def test_what_is_calibrated_is_changed_by_no_candidate(measured):
+    scene = measured.fit[0].scene
+    paths = {path for _, values in feasible(scene, {"rig.outlet_height"}) for path in values}
+    assert "rig.outlet_height" not in paths
+    assert {"rig.mass", "rig.outlet_diameter"} <= paths
+
+
 def test_the_readme_says_how_a_rig_is_turned(tmp_path, measured):
     folder = written(tmp_path / "next", SOURCE, measured, TURNED)
     text = (folder / "README.md").read_text()

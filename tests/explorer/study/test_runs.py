@@ -8,7 +8,7 @@ from doe.run_records import Setting
 from doe.studies.campaign import run_campaign
 from doe.studies.study import load_study, with_profile
 from doe.studies.study_result import PartialStudy, StudyResult
-from explorer.study.runs import scene_of, settings_of, stages_with_runs
+from explorer.study.run_scene import scene_of, settings_of, stages_with_runs
 from solver import pour_key, with_values
 from tests.doe.formula_runner import FormulaRunner
 from tests.explorer import reported_studies

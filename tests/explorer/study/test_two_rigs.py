@@ -19,7 +19,7 @@ from explorer.report.sections import sections_of
 from explorer.report.study_charts import study_plots
 from explorer.study.duration import duration_text, reckoned_time, runs_of_scenes
 from explorer.study.run import result_of
-from explorer.study.runs import scene_of
+from explorer.study.run_scene import scene_of
 from explorer.units import observed
 from explorer.viewer.board.board import board_json
 from explorer.viewer.board.study_board import listed_runs, study_board
