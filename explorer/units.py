@@ -21,6 +21,8 @@ MISSING = "–"
 """What stands for a number that could not be computed."""
 OWN = "own:"
 """Beginning of the path of a quantity that no scene declares: "own:NAME [UNIT]", its values in that unit already."""
+UNIT_ENDINGS = ("_deg", "_kg_m3", "_m", "_s", "_kg")
+"""What ends the name of an observable, and is no word of its label."""
 
 
 class InputError(ValueError):
@@ -147,8 +149,21 @@ def parameter_range(path: str, low: float | str | None, high: float | str | None
 
 def observed(name: str, value: float | None) -> str:
     """A value of an observable with its unit, e.g. "24.68°"."""
+    return unit_of_observable(name).attach(observed_number(name, value))
+
+
+def observed_number(name: str, value: float | None) -> str:
+    """The same without its unit: two places, which suit ° and mm; what they would cut away has three digits."""
     unit = unit_of_observable(name)
-    return unit.attach(fixed(None if value is None else unit.of(value)))
+    read = None if value is None else unit.of(value)
+    # Nobody knows the size of a quantity of someone's own; plain numbers are shares and ratios.
+    least = 1.0 if name.startswith(OWN) or not unit.symbol else 0.01
+    return number(read) if read and abs(read) < least and unit.symbol != "°" else fixed(read)
+
+
+def with_sign(text: str) -> str:
+    """The text of a number as that of a difference: "0.31°" → "+0.31°"."""
+    return text if text == MISSING or text.startswith("−") else f"+{text}"
 
 
 def parameter_label(path: str) -> str:
@@ -176,7 +191,8 @@ def observable_label(name: str) -> str:
         return _own(name)[0]
     experiment, _, reading = name.rpartition("/")
     known = OBSERVABLES.get(reading)
-    label = (known.label if known else "") or reading.removesuffix("_deg").replace("_", " ")
+    ending = next((one for one in UNIT_ENDINGS if reading.endswith(one)), "")
+    label = (known.label if known else "") or reading.removesuffix(ending).replace("_", " ")
     return f"{label}, {experiment.replace('_', ' ')}" if experiment else label
 
 

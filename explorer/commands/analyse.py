@@ -38,7 +38,11 @@ def analyse(
     """Effects, model, analysis of variance, diagnostics, canonical analysis, and the settings that give a target."""
     from explorer.design.analysis import AnalyseOrder, run_analyse
     from explorer.design.text import analysis_text
+    from explorer.errors import CommandError
     from explorer.files.run_folder import json_text
+
+    if target_error and target is None:
+        raise CommandError("--target-error: belongs to --target")
 
     order = AnalyseOrder(
         sheet=sheet,

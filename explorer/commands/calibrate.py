@@ -51,7 +51,7 @@ def calibrate(
     from doe.studies.baseline import BaselineError, compare, moved
     from explorer.background.reporter import end_as_by_ctrl_c, reporter_of
     from explorer.errors import CommandError
-    from explorer.files.output_file import write_whole
+    from explorer.files.output_file import check_folder_of, write_whole
     from explorer.study import for_ci
     from explorer.study.run import StudyOrder, run_study
     from solver import check_scheduler
@@ -59,7 +59,10 @@ def calibrate(
     if not headless:
         raise CommandError("calibrate: add --headless to run here, or start it from the panel of `explorer serve`")
     check_scheduler(scheduler, threads)
-    # Before any pour: a file that is no result is told at once.
+    # Before any pour: a file that is no result, or cannot be written, is told at once.
+    for option, path in (("--summary", summary), ("--junit", junit)):
+        if path is not None:
+            check_folder_of(path, option)
     before = for_ci.read_baseline(baseline) if baseline is not None else None
     end_as_by_ctrl_c()
     one_file = record is not None and record.suffix == ".rrd"

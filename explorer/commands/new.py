@@ -47,7 +47,9 @@ def new(
     set_: list[str] = typer.Option(
         [], "--set", metavar="PATH=VALUE", help="New measurement: set-up of the condition, rig.… and insertion.…"
     ),
-    condition: str = typer.Option("A", metavar="NAME", help="New measurement: condition that the files are of."),
+    condition: str | None = typer.Option(
+        None, metavar="NAME", help="New measurement: condition that the files are of; A by default."
+    ),
     role: Literal["fit", "holdout"] | None = typer.Option(
         None, help="New measurement: of the condition; proposed if not given."
     ),
@@ -68,8 +70,8 @@ def new(
     ),
     lag: float | None = typer.Option(None, min=0.0, metavar="S", help="Lag of the balance, to be taken off its times."),
     scan: list[Path] = typer.Option([], metavar="FILE", help="New measurement: scan of the next pour's pile."),
-    scan_unit: Literal["m", "cm", "mm", "um"] = typer.Option(
-        "m", help="Unit of .ply, .stl, .xyz, .txt and .csv scans."
+    scan_unit: Literal["m", "cm", "mm", "um"] | None = typer.Option(
+        None, help="Unit of .ply, .stl, .xyz, .txt and .csv scans; m by default."
     ),
     drum: str | None = typer.Option(
         None, metavar="FILE.csv[:COMPONENT]", help="New measurement: sheet of `lab drum`, angles of a rotating drum."
@@ -100,6 +102,7 @@ def new(
     if kind == StarterKind.MATERIAL and material is not None:
         raise CommandError("--material: belongs to `new study`, `new project` and `new measurement`")
     measured = (study, *set_, role, *photo, scale, angles, *balance, *starts, lag, *scan, drum, *uncertainty)
+    measured += (condition, scan_unit)
     if kind != StarterKind.MEASUREMENT and (json or any(one is not None for one in measured)):
         raise CommandError(
             "--study, --set, --photo, --angles, --balance, --scan, --drum, …: belong to `new measurement`"
@@ -119,7 +122,7 @@ def new(
 
         if scale is not None and not 0.0 < scale < float("inf"):
             raise CommandError(f"--scale {scale:g} mm/px: must be positive and finite")
-        asked = NewCondition(condition, role, study, material, tuple(set_), tuple(uncertainty))
+        asked = NewCondition(condition or "A", role, study, material, tuple(set_), tuple(uncertainty))
         pixel = None if scale is None else 1e-3 * scale
         photographs = tuple(asset_path("photographs", one) for one in photo)
         brought = Brought(
@@ -130,7 +133,7 @@ def new(
             starts=tuple(starts),
             lag=lag,
             scans=tuple(scan),
-            scan_unit=scan_unit,
+            scan_unit=scan_unit or "m",
             drum=drum,
         )
         found = write_condition(out / name, asked, brought)

@@ -42,7 +42,14 @@ def repeat(
     with reporter_of("repeat", json) as reporter:
         found = pour_more(PoursOrder(scene, pours, out, store, threads, scheduler), reporter)
     rows = [
-        [one.observable, f"{one.sample.mean:.4g}", f"{one.sample.sd:.4g}", str(one.n), str(one.void)]
+        # One seed has a mean, and no standard deviation.
+        [
+            one.observable,
+            f"{one.sample.mean:.4g}",
+            f"{one.sample.sd:.4g}" if one.n > 1 else "-",
+            str(one.n),
+            str(one.void),
+        ]
         for one in found
         if one.n
     ]

@@ -44,7 +44,7 @@ def schema(
     begins with the line: #:schema FILE
     """
     from explorer.errors import CommandError
-    from explorer.files.output_file import write_whole
+    from explorer.files.output_file import check_folder_of, write_whole
     from solver import json_schema
 
     if kind not in KINDS:
@@ -53,6 +53,7 @@ def schema(
     if out is None:
         typer.echo(text, nl=False)
     else:
+        check_folder_of(out, "--out")
         write_whole(out, text)
 
 

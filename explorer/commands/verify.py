@@ -10,6 +10,8 @@ import typer
 if TYPE_CHECKING:
     from solver.verification import Row
 
+USUAL_POURS = 241
+
 
 def verify(
     only: list[str] = typer.Option([], metavar="NAME", help="Run only this part, e.g. T4; may be repeated."),
@@ -26,9 +28,13 @@ def verify(
     economy: str | None = typer.Option(
         None, metavar="STUDY", help="Compare piles with and without an economy of the method, for this study instead."
     ),
-    change: str = typer.Option("larger_steps", metavar="NAME", help="With --economy: which one."),
-    profile: str = typer.Option("standard", help="With --economy: shapes and mass of this profile of the study."),
-    pours: int = typer.Option(241, min=2, help="With --economy: pours of each kind at each of three settings."),
+    change: str | None = typer.Option(None, metavar="NAME", help="With --economy: which one; larger_steps by default."),
+    profile: str | None = typer.Option(
+        None, help="With --economy: shapes and mass of this profile of the study; standard by default."
+    ),
+    pours: int | None = typer.Option(
+        None, min=2, help="With --economy: pours of each kind at each of three settings; 241 by default."
+    ),
     store: Path | None = typer.Option(None, metavar="FILE", help="With --economy: where pours are kept."),
 ) -> None:
     """Check the solver against known answers.
@@ -45,8 +51,11 @@ def verify(
             raise CommandError("--economy: compares piles and nothing else; leave --only, --peers and --all out")
         from explorer.study.economy import compare_economy, economy_text
 
-        typer.echo(economy_text(compare_economy(economy, profile, change, pours, store, json, typer.echo)))
+        asked = (economy, profile or "standard", change or "larger_steps", pours or USUAL_POURS)
+        typer.echo(economy_text(compare_economy(*asked, store, json, typer.echo)))
         return
+    if any(one is not None for one in (change, profile, pours, store)):
+        raise CommandError("--change, --profile, --pours, --store: belong to --economy")
     from explorer.export.impacts import liggghts_engine
     from explorer.export.run import installed
     from explorer.files.output_file import write_whole

@@ -15,6 +15,14 @@ def check_new_file(path: Path, suffix: str = "", option: str = "") -> None:
         raise CommandError(f"{named}: the name must end in {suffix}")
     if path.exists():
         raise CommandError(f"{named}: exists already; choose another name")
+    check_folder_of(path, option)
+
+
+def check_folder_of(path: Path, option: str = "") -> None:
+    """Raise :class:`CommandError` unless ``path``, named by ``option``, is or can become a file in its folder."""
+    named = f"{option} {path}".lstrip()
+    if path.is_dir():
+        raise CommandError(f"{named}: is a folder; name a file")
     if not path.absolute().parent.is_dir():
         raise CommandError(f"{named}: there is no folder {path.absolute().parent}")
 
@@ -41,5 +49,9 @@ def write_whole(path: Path, text: str) -> None:
 def write_whole_bytes(path: Path, contents: bytes) -> None:
     """The same for ``contents``."""
     temporary = path.with_name(f".{path.name}.part")
-    temporary.write_bytes(contents)
-    temporary.replace(path)
+    try:
+        temporary.write_bytes(contents)
+        temporary.replace(path)
+    except OSError:
+        temporary.unlink(missing_ok=True)
+        raise

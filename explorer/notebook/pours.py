@@ -257,7 +257,13 @@ def pour(source: Source, settings: Settings | None = None, *, seed: int = 1) -> 
 
     scene = load(source, settings)
     pour_rig(scene)
-    return Poured(run_pour(scene, seed, threads=1))
+    return Poured(run_pour(scene, _checked_seed(seed), threads=1))
+
+
+def _checked_seed(seed: int) -> int:
+    if seed != int(seed) or seed < 0:
+        raise ParameterError(f"seed {seed}: allowed: a whole number from 0 on")
+    return int(seed)
 
 
 def sweep(
@@ -315,8 +321,11 @@ def sweep(
     for name in names:
         if name not in given:
             raise ParameterError(f"observables: {name!r} is not one of {', '.join(given)}")
-    numbers = tuple(range(1, seeds + 1)) if isinstance(seeds, int | np.integer) else tuple(map(int, seeds))
-    levels = [[one] if isinstance(one, str | int | float) else one for one in values.values()]
+    if isinstance(seeds, int | np.integer):
+        numbers = tuple(range(1, _checked_seed(int(seeds)) + 1))
+    else:
+        numbers = tuple(map(_checked_seed, seeds))
+    levels = [one if isinstance(one, Iterable) and not isinstance(one, str) else [one] for one in values.values()]
     grid = [dict(zip(values, row, strict=True)) for row in product(*levels)]
     # As they are in the scene: in SI, and a mass fraction after those that were set behind it.
     poured = [{path: value(changed, path) for path in values} for changed in (with_values(scene, row) for row in grid)]

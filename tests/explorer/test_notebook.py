@@ -130,6 +130,12 @@ def test_nothing_is_poured_into_a_bench_test():
         explorer.pour("inclined_plane")
 
 
+@pytest.mark.parametrize("seed", [-1, 1.5])
+def test_a_seed_that_is_none_is_one_line(scene, seed):
+    with pytest.raises(ValueError, match=f"^seed {seed}: allowed: a whole number from 0 on$"):
+        explorer.pour(scene, seed=seed)
+
+
 def test_a_material_needs_a_rig(scene):
     with pytest.raises(ValueError, match="only a rig takes one"):
         explorer.load(scene, material="nine_sphere_seed")
@@ -255,6 +261,10 @@ def test_what_is_in_the_store_is_not_poured_again(swept, scene, monkeypatch):
         ({"rig.mass": ["5 g", "2 m"]}, {}, "rig.mass: unit 'm'"),
         ({"rig.masss": [1]}, {}, "rig.masss: no such parameter"),
         ({}, {"observables": ["angle"]}, "observables: 'angle' is not one of angle_of_repose_deg, "),
+        ({"rig.mass": np.int64(20)}, {}, "rig.mass: 20 kg"),
+        ({"rig.mass": None}, {}, "rig.mass: None"),
+        ({}, {"seeds": [1, -1]}, "seed -1: allowed: a whole number from 0 on"),
+        ({}, {"seeds": -1}, "seed -1: allowed: a whole number from 0 on"),
     ],
 )
 def test_a_sweep_is_refused_before_anything_is_poured(scene, tmp_path, values, options, told):

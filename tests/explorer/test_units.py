@@ -12,7 +12,19 @@ from doe.analysis.screening import analyse_screening
 from doe.analysis.t_tests import Sample
 from doe.designs import factorial
 from doe.run_records import sample_of
-from explorer.units import code, number, p_value, parameter_label, parameter_range, parameter_value, percent
+from explorer.units import (
+    code,
+    number,
+    observable_label,
+    observed,
+    own_path,
+    p_value,
+    parameter_label,
+    parameter_range,
+    parameter_value,
+    percent,
+    with_sign,
+)
 
 
 def test_intervals_agree_with_scipy():
@@ -61,3 +73,35 @@ def test_missing_number_is_a_dash(value):
 
 def test_code_span_cannot_be_left():
     assert code("a`b") == "`a'b`"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "text"),
+    [
+        (own_path("porosity", ""), 0.0025, "0.0025"),
+        (own_path("porosity", ""), 0.41234, "0.412"),
+        (own_path("porosity", ""), -3e-6, "−3.00e−06"),
+        (own_path("porosity", ""), 0.0, "0.00"),
+        (own_path("load", "N"), 24.6789, "24.68 N"),
+        ("solid_fraction", 0.0031, "0.0031"),
+        ("apex_height_m", 4e-6, "0.004 mm"),
+        ("apex_height_m", 0.00123, "1.23 mm"),
+        ("angle_of_repose_deg", 0.1234, "0.12°"),
+        ("angle_of_repose_deg", math.nan, "–"),
+    ],
+)
+def test_no_value_of_an_observable_is_rounded_away(name, value, text):
+    assert observed(name, value) == text
+
+
+def test_a_difference_has_its_sign():
+    assert [with_sign(observed("apex_height_m", value)) for value in (0.002, -0.002, 0.0, math.nan)] == [
+        *("+2.00 mm", "−2.00 mm", "+0.00 mm", "–")
+    ]
+
+
+def test_a_label_has_no_unit_in_it():
+    names = ("apex_height_m", "bulk_density_kg_m3", "discharge_t10_s", "drum/dynamic_angle_deg", "stray_fraction")
+    assert [observable_label(name) for name in names] == [
+        *("apex height", "bulk density", "discharge t10", "dynamic angle, drum", "stray fraction")
+    ]

@@ -17,11 +17,13 @@ from explorer.units import (
     number,
     observable_title,
     observed,
+    observed_number,
     p_value,
     parameter_label,
     parameter_value,
     percent,
     signed,
+    with_sign,
 )
 
 
@@ -64,7 +66,8 @@ def fit_facts(result: DesignResult, found: NamedFit) -> list[tuple[str, str]]:
     ]
     if found.block_names:
         told = ", ".join(
-            f"{name} {signed(effect)}" for name, effect in zip(found.block_names, found.block_effects, strict=True)
+            f"{name} {with_sign(observed_number(result.response.path, effect))}"
+            for name, effect in zip(found.block_names, found.block_effects, strict=True)
         )
         facts.append(("Blocks", f"{told}; they add up to zero, and the model is their mean"))
     return facts

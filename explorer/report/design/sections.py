@@ -33,18 +33,20 @@ from explorer.units import (
     fixed,
     number,
     observed,
+    observed_number,
     p_value,
     parameter_label,
     parameter_value,
     percent,
-    signed,
     term_text,
+    with_sign,
 )
 
 WHOLE = ("block", "model", "residual", "lack_of_fit", "pure_error", "total")
 """Rows of an analysis of variance that are no terms."""
 MOST_PANELS = 3
 """Factors up to which every pair of them has a panel."""
+REPEAT_RUNS = "Repeat runs: replicates or centre runs show how large the noise is."
 
 
 def target(result: DesignResult) -> Section | None:
@@ -192,7 +194,7 @@ def banner(result: DesignResult) -> Banner:
                 Word.NO_ANSWER,
                 "",
                 "The model is not better than noise, so the setting for the target is a point and no answer.",
-                "Repeat runs: replicates or centre runs show how large the noise is.",
+                REPEAT_RUNS,
             )
         return Banner(
             Word.TARGET_REACHED,
@@ -222,6 +224,8 @@ def banner(result: DesignResult) -> Banner:
             f"Of {result.runs.valid} runs: {acting_words(result)}.",
             "Ask for the settings of a value: `explorer analyse … --target`.",
         )
+    if not _tested(result):
+        return Banner(Word.NO_ANSWER, "", f"Of {result.runs.valid} runs: {acting_words(result)}.", REPEAT_RUNS)
     return Banner(
         Word.NO_EFFECT,
         "",
@@ -270,6 +274,21 @@ def _acting_names(result: DesignResult) -> list[str]:
     return [term_text(row.source) for row in rows if row.p < 0.05]
 
 
+def _tested(result: DesignResult) -> bool:
+    """Whether anything was tested: without scatter, or without a model, no effect found is no finding."""
+    found = result.analysis
+    if found.effects is not None:
+        return True  # at least by Lenth's margin
+    if found.mixture is not None:
+        return math.isfinite(found.mixture.rows[0].p)
+    if found.elementary is not None:
+        return any(math.isfinite(one.p) for one in found.elementary.effects)
+    if found.random is not None:
+        return any(math.isfinite(one.p) for one in found.random.tests)
+    anova = found.model.anova if found.model is not None else found.named
+    return anova is not None and any(math.isfinite(row.p) for row in anova.rows if row.source not in WHOLE)
+
+
 def in_short(result: DesignResult) -> Section:
     """The answer in a few lines, and what the letters stand for."""
     runs, response, found = result.runs, result.response.path, result.analysis
@@ -291,7 +310,7 @@ def in_short(result: DesignResult) -> Section:
         surface = found.model.surface
         if surface.block_names:
             effects = zip(surface.block_names, surface.block_effects, strict=True)
-            told = ", ".join(f"{name} {signed(effect)}" for name, effect in effects)
+            told = ", ".join(f"{name} {with_sign(observed_number(response, effect))}" for name, effect in effects)
             facts.append(("Blocks", f"{told}; they add up to zero, and the model is their mean"))
         if found.effects is None:
             facts.append(("Terms that act", terms_that_act(anova.rows)))

@@ -14,6 +14,7 @@ from doe.holdout import OVERALL
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.units import (
     MISSING,
+    UNIT_ENDINGS,
     ReadingUnit,
     code,
     number,
@@ -30,7 +31,6 @@ from solver.observables.surface_features import EDGES, RINGS
 
 ROUNDING = 1e-9
 """Share of the strongest amplitude below which one is zero."""
-UNIT_ENDINGS = ("_deg", "_kg_m3", "_m", "_s", "_kg")
 
 
 # The answer

@@ -191,7 +191,7 @@ def cloud(fitted: FittedTarget) -> Spec:
     domains = side_by_side(len(pairs), 0.1)
     sizes = np.array([unit_of_parameter(factor.path).size for factor in factors])
     refits = (found.bootstrap_points / sizes).tolist()
-    chosen, measured = (found.point / sizes).tolist(), (found.reference / sizes).tolist()
+    chosen, measured = (np.array(fitted.chosen) / sizes).tolist(), (found.reference / sizes).tolist()
     traces: list[Json] = []
     layout: Json = {}
     for panel, (i, j) in enumerate(pairs):

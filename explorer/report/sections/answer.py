@@ -31,7 +31,7 @@ from explorer.units import (
     p_value,
     parameter_label,
     percent,
-    unit_of_observable,
+    with_sign,
 )
 
 
@@ -174,7 +174,8 @@ def cautions(result: StudyResult) -> list[str]:
     missing = result.screening.analysis.missing_rows
     if missing:
         rows = enumeration([str(row + 1) for row in missing])
-        found.append(f"Screening row {rows} has no valid pour and is analysed as missing.")
+        one, has, is_ = ("row", "has", "is") if len(missing) == 1 else ("rows", "have", "are")
+        found.append(f"Screening {one} {rows} {has} no valid pour and {is_} analysed as missing.")
     walk = result.ascent
     if walk.approach is not None and not walk.approach.reached:
         found.append("The steepest ascent did not meet all targets; the surface stands over the whole of the ranges.")
@@ -449,9 +450,7 @@ def _tests(target: Target, test: Verification) -> Table:
 
 def _difference(name: str, value: float) -> str:
     """A difference with its sign and unit."""
-    text = observed(name, value)
-    unit = unit_of_observable(name)
-    return f"+{text}" if unit.of(value) >= 0 else text
+    return with_sign(observed(name, value))
 
 
 def effects(result: StudyResult) -> Section:

@@ -24,6 +24,7 @@ from explorer.units import (
     observable_label,
     observable_title,
     observed,
+    observed_number,
     p_value,
     parameter_label,
     parameter_range,
@@ -31,6 +32,7 @@ from explorer.units import (
     percent,
     signed,
     unit_of_observable,
+    with_sign,
 )
 
 
@@ -220,6 +222,7 @@ def not_testable(part: ScreeningResult) -> list[Block]:
 def effect_table(part: ScreeningResult) -> Table:
     """Effects by falling size with their tests; the last column reads the same pours in the target's observable."""
     analysis = part.analysis
+    size = unit_of_observable(part.response).size
     factors = {factor.name: factor for factor in part.factors}
     in_target = {effect.name: effect for effect in part.target_analysis.effects}
     untestable = {entry.factor for entry in part.not_testable}
@@ -232,14 +235,14 @@ def effect_table(part: ScreeningResult) -> Table:
                 effect.name.replace("_", " ") + (" †" if effect.name in untestable else ""),
                 parameter_label(factor.path),
                 parameter_range(factor.path, factor.low, factor.high),
-                signed(effect.effect),
-                f"± {fixed(analysis.half_width(effect))}",
+                with_sign(observed_number(part.response, effect.effect)),
+                f"± {observed_number(part.response, analysis.half_width(effect))}",
                 MISSING if by_replicates is None else p_value(by_replicates.p),
                 MISSING if by_dummies is None else p_value(by_dummies.p),
                 MISSING if deciding is None else p_value(deciding.p_holm),
-                fixed(effect.sum_of_squares),
+                fixed(effect.sum_of_squares / size**2),
                 fixed(effect.contribution_percent, 1),
-                signed(in_target[effect.name].effect),
+                with_sign(observed_number(part.response, in_target[effect.name].effect)),
             )
         )
     header = (
@@ -261,9 +264,10 @@ def further_effects(part: ScreeningResult) -> Table:
     for name, analysis in part.further_analyses.items():
         for effect in analysis.factor_effects():
             test = analysis.deciding_test(effect)
-            half = f"± {fixed(analysis.half_width(effect))}"
+            half = f"± {observed_number(name, analysis.half_width(effect))}"
             p = MISSING if test is None else p_value(test.p_holm)
-            rows.append((observable_title(name), effect.name.replace("_", " "), signed(effect.effect), half, p))
+            size = with_sign(observed_number(name, effect.effect))
+            rows.append((observable_title(name), effect.name.replace("_", " "), size, half, p))
     caption = "Effects on the other targets; of a factor the largest |t| over all targets counts for going on."
     return Table(("target", "factor", "effect", "95 %", "p Holm"), tuple(rows), caption)
 

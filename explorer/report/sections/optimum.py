@@ -51,7 +51,7 @@ def optimum(result: StudyResult) -> Section:
             f"n = {len(single.bootstrap_points)} refits to resampled {single.resampling} (bootstrap); each dot is the "
             "solution "
             f"nearest the measured parameters. {percent(single.share_reached)} of the refits reach the target. "
-            f"{cloud_caution(found)}".rstrip(),
+            f"{cloud_caution(found) if found.compromise is None else REFITS_ALONE}".rstrip(),
         ),
     ]
     return Section("Optimum", tuple(blocks))
@@ -69,18 +69,23 @@ def _statement(result: StudyResult) -> str:
     single = result.optimum.single
     name = result.study.targets[0].observable
     between = f"{observed(name, single.predicted_low)} … {observed(name, single.predicted_high)}"
+    several = result.optimum.compromise is not None
     if single.reached:
+        this = f"the one nearest the measured parameters is {fixed(single.distance)} half-widths from them"
+        if not several:
+            this = f"this one is nearest the measured parameters (distance {fixed(single.distance)} half-widths)"
         text = (
-            f"Of all settings at which the model gives {observed(name, single.target)}, this one is nearest the "
-            f"measured parameters (distance {fixed(single.distance)} half-widths); the model's 95 % interval there "
-            f"is {between}."
+            f"Of all settings at which the model gives {observed(name, single.target)}, {this}; the model's 95 % "
+            f"interval there is {between}."
         )
     else:
         text = (
             f"The model does not give {observed(name, single.target)} in its region; it comes nearest with "
             f"{observed(name, single.predicted)} ({between})."
         )
-    if single.unidentified:
+    if several:
+        text = f"By the {observable_label(name)} alone: {text[0].lower()}{text[1:]}"
+    elif single.unidentified:
         text += (
             f" The target does not identify {enumeration(single.unidentified)}: the answer is the range that gives "
             "the target, and the value in it is chosen by rule."
@@ -122,6 +127,7 @@ def _settings(result: StudyResult, reference_name: str) -> Table:
 
 JOINT = "Ranges are 95 % intervals of what all targets say together."
 FIRST_ALONE = "Intervals and ranges of the first target alone."
+REFITS_ALONE = "The refits are of the first target alone, the star is the setting of all targets."
 
 
 def _compromise(result: StudyResult, compromise: Compromise) -> list[Block]:

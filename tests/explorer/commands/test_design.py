@@ -552,6 +552,7 @@ def test_a_sheet_is_not_written_over(tmp_path):
         (("--terms", "A*B*C"), "--terms A*B*C: allowed are"),
         (("--only", "x"), "--only x: no such factor"),
         (("--target", "nan"), "--target nan: allowed"),
+        (("--target-error", "2"), "--target-error: belongs to --target"),
     ],
 )
 def test_bad_orders_of_an_analysis_get_one_line(options, message):

@@ -151,3 +151,9 @@ def test_existing_files_are_left_alone(tmp_path):
 def test_new_refuses(arguments, word, tmp_path):
     assert word in refused(explorer("new", *arguments, "--out", tmp_path))
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("option", [("--condition", "B"), ("--scan-unit", "mm"), ("--lag", "1")])
+def test_what_belongs_to_a_measurement_is_refused_elsewhere(option, tmp_path):
+    assert "belong to `new measurement`" in refused(explorer("new", "material", "lentil", "--out", tmp_path, *option))
+    assert list(tmp_path.iterdir()) == []

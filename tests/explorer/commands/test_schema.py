@@ -86,3 +86,5 @@ def test_it_is_written_where_asked_and_an_unknown_kind_is_refused(tmp_path):
     assert explorer("schema", "preset", "--out", tmp_path / "preset.json").exit_code == 0
     assert json.loads((tmp_path / "preset.json").read_text()) == schema_of("preset")
     assert "allowed: material, body, study" in refused(explorer("schema", "recipe"))
+    lost = tmp_path / "none" / "preset.json"
+    assert refused(explorer("schema", "preset", "--out", lost)) == f"--out {lost}: there is no folder {lost.parent}"

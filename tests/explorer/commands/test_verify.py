@@ -130,3 +130,8 @@ def test_an_economy_that_does_not_exist_is_refused():
     result = explorer("verify", "--economy", "sunflower_extract", "--change", "magic")
     assert result.exit_code == 2
     assert "--change: 'magic' is not one of larger_steps, softer_grains" in result.stderr
+
+
+@pytest.mark.parametrize("option", [("--pours", "10"), ("--profile", "quick"), ("--change", "x"), ("--store", "s")])
+def test_what_belongs_to_an_economy_is_refused_without_one(option):
+    assert "belong to --economy" in refused(explorer("verify", "--only", "T1", *option))

@@ -3,7 +3,7 @@
 import pytest
 
 from explorer.errors import CommandError
-from explorer.files.output_file import check_new_file, check_vacant
+from explorer.files.output_file import check_new_file, check_vacant, write_whole
 
 VACANT = "name a folder that is new or empty"
 
@@ -55,3 +55,11 @@ def test_a_file_has_to_be_new_in_a_folder_that_is_there(folder):
     assert refused(there, suffix=".csv") == f"{there}: the name must end in .csv"
     assert refused(there, suffix="", option="--out") == f"--out {there}: exists already; choose another name"
     assert refused(lost, suffix=".txt") == f"{lost}: there is no folder {folder / 'none'}"
+
+
+def test_a_file_that_cannot_be_put_in_place_leaves_no_part(folder):
+    (folder / "taken").mkdir()
+    before = sorted(folder.iterdir())
+    with pytest.raises(OSError, match="taken"):
+        write_whole(folder / "taken", "text")
+    assert sorted(folder.iterdir()) == before

@@ -5,13 +5,16 @@ import signal
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
+from doe.analysis.t_tests import Sample
 from doe.store import Store
 from explorer.background.events import PROGRESS
 from explorer.background.reporter import Reporter
 from explorer.errors import CommandError
+from explorer.population import run
 from explorer.population.process import PopulationProcess
 from explorer.population.run import PoursOrder, new_seeds, pour_more
 from explorer.scene.file import load_scene
@@ -122,3 +125,10 @@ def test_cut_off_it_ends_in_order_and_keeps_what_is_there(tmp_path):
     kept = Store(store, pouring=False)
     assert 2 <= len(list(kept.pours_of(SCENE))) < 200
     kept.close()
+
+
+def test_one_seed_has_no_standard_deviation(monkeypatch):
+    one = SimpleNamespace(observable="angle_of_repose_deg", sample=Sample.of([24.5]), n=1, void=0)
+    monkeypatch.setattr(run, "pour_more", lambda order, reporter: [one])
+    said = explorer("repeat", "funnel", "--pours", "1").stdout.splitlines()
+    assert said[-1].split() == ["angle_of_repose_deg", "24.5", "-", "1", "0"]

@@ -16,10 +16,10 @@ from explorer.design.factors_file import DesignFactor
 from explorer.design.filled_sheet import Runs
 from explorer.design.result import DesignResult
 from explorer.design.text import analysis_text
-from explorer.report.content import Figure, Folded, Table
+from explorer.report.content import Figure, Folded, Table, Word
 from explorer.report.design import design_html, design_markdown
 from explorer.report.design.charts import design_plots
-from explorer.report.design.sections import sections_of
+from explorer.report.design.sections import banner, sections_of
 
 pytestmark = pytest.mark.usefixtures("unprinted")
 
@@ -187,3 +187,20 @@ def test_names_from_outside_are_escaped():
     assert "<script>alert(1)" not in page
     assert "<img src=x>" not in page
     assert "&lt;script&gt;alert(1)" in page
+
+
+def test_where_nothing_could_be_tested_no_effect_found_is_no_verdict():
+    constant, found = (analyse_runs(CASES[name][0], AnalyseOrder("runs.csv", "load")) for name in
+                       ("constant", "without a target"))  # fmt: skip
+    assert banner(constant).word is Word.NO_ANSWER
+    assert "cannot be told without scatter" in banner(constant).why
+    assert banner(found).word in (Word.NO_EFFECT, Word.EFFECT_FOUND)
+
+
+def test_a_small_response_is_not_rounded_away():
+    sheet, _ = CASES["three factors"]
+    small = replace(sheet, unit="", responses=1e-4 * sheet.responses)
+    result = analyse_runs(small, AnalyseOrder("runs.csv", "load", 1e-3))
+    assert banner(result).headline == "TARGET REACHED 0.001"
+    runs_table = next(section for section in sections_of(result) if section.title == "Runs").blocks[0]
+    assert len({row[-1] for row in runs_table.rows}) > 5

@@ -17,9 +17,11 @@ from explorer.report.design import design_markdown
 from explorer.report.design.charts import design_plots
 from explorer.report.figures.model import fitted_targets, ranges
 from explorer.report.html import escaped
+from explorer.report.sections.designs import effect_table, further_effects
+from explorer.report.sections.optimum import optimum
 from explorer.report.study_charts import study_plots
 from explorer.study.for_ci import errors, junit
-from explorer.units import MISSING, observable_label, observed, parameter_range, parameter_value
+from explorer.units import MISSING, observable_label, observed, parameter_range, parameter_value, signed
 from tests.explorer import reported_studies
 from tests.explorer.command_line import explorer
 from tests.explorer.reported_studies import typed
@@ -209,3 +211,41 @@ def test_the_progress_of_a_study_calls_the_point_chosen_by_rule():
     assert line.startswith("chosen by rule: ")
     for name, low, high in zip(single.names, single.solution_low, single.solution_high, strict=True):
         assert f"{name} in {low:.4g} … {high:.4g}" in line
+
+
+def test_effects_stand_in_the_unit_that_their_title_names():
+    """A height in metres: its effects are read in millimetres, as the title says."""
+    part = typed(reported_studies.result_of_case("planted")).screening
+
+    def in_metres(analysis):
+        shrunk = [
+            replace(one, effect=1e-3 * one.effect, sum_of_squares=1e-6 * one.sum_of_squares) for one in analysis.effects
+        ]
+        return replace(analysis, effects=tuple(shrunk))
+
+    height = replace(
+        part,
+        response="apex_height_m",
+        analysis=in_metres(part.analysis),
+        target_analysis=in_metres(part.target_analysis),
+        further_analyses={"apex_height_m": in_metres(part.target_analysis)},
+    )
+    assert "apex height [mm]" in effect_table(height).caption
+    for seen, same in zip(effect_table(height).rows, effect_table(part).rows, strict=True):
+        assert (seen[3], seen[8], seen[10]) == (same[3], same[8], same[10])
+    largest = max(part.target_analysis.factor_effects(), key=lambda one: abs(one.effect))
+    rows = {row[1]: row for row in further_effects(height).rows}
+    assert rows[largest.name][0] == "apex height [mm]"
+    assert rows[largest.name][2] == signed(largest.effect)
+
+
+def test_of_several_targets_no_sentence_calls_the_chosen_setting_that_of_one():
+    several = typed(reported_studies.result_of_case("two targets"))
+    single, values = several.optimum.single, list(several.optimum.values.values())
+    assert values != single.point.tolist()
+    section = optimum(several)
+    assert section.blocks[0].text.startswith("By the angle of repose, silhouette alone: of all settings at which the ")
+    assert "this one is nearest" not in section.blocks[0].text
+    spec = next(block for block in section.blocks if getattr(block, "name", "") == "cloud").spec
+    star = next(trace for trace in spec["data"] if trace["marker"].get("symbol") == "star")
+    assert star["x"] == [pytest.approx(values[0])]

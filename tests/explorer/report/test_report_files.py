@@ -299,13 +299,13 @@ def test_of_several_targets_the_verdict_names_every_one():
     assert report.banner.word is Word.CALIBRATED
     assert re.search(
         r"gave \S+° against \S+° measured \(angle of repose, silhouette\) and \S+ kg/m³ against \S+ kg/m³ measured "
-        r"\(bulk density kg m3\)",
+        r"\(bulk density\)",
         report.banner.why,
     )
     assert report.banner.why.count("equivalent to the measurement within") == 2
     overview = next(section for section in report.sections if section.title == "In short")
     facts = dict(overview.blocks[0].pairs)
-    assert {"Verification (bulk density kg m3)", "Noise of one pour (bulk density kg m3)"} <= set(facts)
+    assert {"Verification (bulk density)", "Noise of one pour (bulk density)"} <= set(facts)
     assert not any("One number cannot fix" in block.text for block in overview.blocks if isinstance(block, Caution))
     ascent = next(section for section in report.sections if section.title == "Steepest ascent")
     assert [block.name for block in ascent.blocks if isinstance(block, Figure)] == ["ascent", "ascent-2"]
@@ -320,7 +320,7 @@ def test_of_several_targets_any_may_spoil_the_verdict():
     spoiled = (found.surface.anova[0], dataclasses.replace(found.surface.anova[1], better_than_noise=False))
     noisy = study_report(dataclasses.replace(found, surface=dataclasses.replace(found.surface, anova=spoiled))).banner
     assert noisy.word is Word.NOT_CALIBRATED
-    assert noisy.why.startswith("The response surface of the bulk density kg m3 is not better than noise")
+    assert noisy.why.startswith("The response surface of the bulk density is not better than noise")
     first, second = found.verification.tests
     far = verify(second.target.mean + np.arange(40.0, 46.0), second.target.mean, 2.0, 10, 2.0)
     missed = dataclasses.replace(

@@ -171,6 +171,8 @@ def test_a_target_out_of_reach_stops_a_study_unless_it_is_told_to_go_on(tmp_path
         (("--study", "nowhere.toml"), "sunflower_extract"),
         (("--fail-above", "-1"), "fail-above"),
         (("--scheduler", "tcp://127.0.0.1:9", "--record", "pours"), "--record pours: a folder takes pours of this"),
+        (("--summary", "no/such/summary.md"), "--summary no/such/summary.md: there is no folder "),
+        (("--junit", "/"), "--junit /: is a folder; name a file"),
     ],
 )
 def test_bad_orders_are_one_line_and_leave_nothing(tmp_path, options, says):
