@@ -78,7 +78,7 @@ def test_a_photograph_is_read_and_made_the_target(browser, project):
         use.wait_for()
         assert use.is_disabled()
         page.get_by_role("button", name="Read the angle", exact=True).click()
-        page.wait_for_function(ENABLED, "Use as target")
+        page.wait_for_function(ENABLED, arg="Use as target")
         table = page.locator("table", has_text="cone_25_30.jpg")
         for width in (320, 346):
             assert table.evaluate(CUT_OFF, width) == []
@@ -105,7 +105,7 @@ def test_it_is_there_after_a_restart_until_it_is_removed(browser, project):
         room(page, "Laboratory")
         page.get_by_text("Photograph → angle of repose").click()
         remove = page.get_by_role("button", name="Remove the target", exact=True)
-        page.wait_for_function(ENABLED, "Remove the target")
+        page.wait_for_function(ENABLED, arg="Remove the target")
         # By key: what is loaded above it may push it away from under the pointer.
         remove.press("Enter")
         page.locator("#state-line").get_by_text("25.00° ± 2.00°").wait_for()
