@@ -78,8 +78,8 @@ def check_cells(table: CellTable, wrong: Callable[[int, str], Exception], short:
 
     ``short``: whether a row may have fewer.
     """
+    columns = len(table.rows[0][1]) if table.rows else 0
     for line, cells in table.rows:
-        columns = len(table.rows[0][1])
         if len(cells) > columns or (len(cells) < columns and not short):
             raise wrong(
                 line,

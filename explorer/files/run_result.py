@@ -257,8 +257,3 @@ def _energy(trace: Trace) -> EnergyAccount:
 
 def _or_nan(number: float | None) -> float:
     return math.nan if number is None else number
-
-
-def finite_or_none(number: float | None) -> float | None:
-    """A number as JSON has it: None for NaN and infinity."""
-    return None if number is None or not math.isfinite(number) else float(number)

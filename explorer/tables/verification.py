@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from explorer.files.run_result import finite_or_none, versions
+from explorer.files.run_result import versions
 from explorer.tables.text_table import text_table
 from solver.verification import OURS_BY_DISPLACEMENT, Row
 
@@ -119,7 +119,7 @@ def _peer_cells(ours: Row, theirs: Row) -> list[str]:
 def _peer_record(row: Row, beside: Mapping[str, Mapping[tuple[str, str, str], Row]]) -> dict[str, Any]:
     found = {name: rows[_key(row)] for name, rows in beside.items() if _key(row) in rows}
     records = {
-        name: {"value": finite_or_none(one.ours), "error_percent": finite_or_none(one.error), "ok": one.passed}
+        name: {"value": _finite_or_none(one.ours), "error_percent": _finite_or_none(one.error), "ok": one.passed}
         for name, one in found.items()
     }
     return {"peers": records} if records else {}
@@ -138,11 +138,16 @@ def _record(row: Row) -> dict[str, Any]:
         "test": row.test,
         "quantity": row.quantity,
         "at": row.at,
-        "reference": finite_or_none(row.reference),
-        "ours": finite_or_none(row.ours),
-        "error_percent": finite_or_none(row.error),
+        "reference": _finite_or_none(row.reference),
+        "ours": _finite_or_none(row.ours),
+        "error_percent": _finite_or_none(row.error),
         "of": row.scale_name,
         "limit_percent": row.limit,
         "ok": row.passed,
         "source": row.source,
     }
+
+
+def _finite_or_none(number: float | None) -> float | None:
+    """A number as JSON has it: None for NaN and infinity."""
+    return None if number is None or not math.isfinite(number) else float(number)

@@ -198,17 +198,13 @@ def _with_fraction(bodies: tuple[Body, ...], name: str, new: float) -> tuple[Bod
         raise ParameterError(f"body.{name}.mass_fraction: {new:g}, but there is no other component; allowed: 1")
     others = sum(body.mass_fraction for body in bodies if body.name != name)
     rest = 1.0 - new
-    return tuple(
-        dataclasses.replace(
-            body,
-            mass_fraction=new
-            if body.name == name
-            else body.mass_fraction * (rest / others)
-            if others > 0
-            else rest / (len(bodies) - 1),
-        )
-        for body in bodies
-    )
+
+    def share(body: Body) -> float:
+        if body.name == name:
+            return new
+        return body.mass_fraction * (rest / others) if others > 0 else rest / (len(bodies) - 1)
+
+    return tuple(dataclasses.replace(body, mass_fraction=share(body)) for body in bodies)
 
 
 def _with_size(body: Body, key: str, new: Any) -> Body:
