@@ -114,7 +114,7 @@ def examined_result(findings: Sequence[Finding]) -> dict[str, Any]:
 
 def examined_text(findings: Sequence[Finding]) -> str:
     """A table of a line each, and whether the main path works."""
-    from explorer.tables.text_table import text_table
+    from explorer.terminal.text_table import text_table
 
     rows = [
         (one.thing, "present", one.found, "", "")

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from explorer.errors import CommandError
 from explorer.files.output_file import check_new_file, write_whole
 from explorer.scene.text import body_text
-from explorer.tables.text_table import table_line
+from explorer.terminal.text_table import table_line
 from solver.shapes.clump import DEMANDS, MOST_SPHERES
 from solver.shapes.clump_error import SphereError, sphere_error
 from solver.shapes.mesh_file import LENGTH_UNITS

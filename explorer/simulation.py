@@ -19,7 +19,7 @@ from explorer.files.checkpoint_writer import CheckpointWriter
 from explorer.files.run_folder import appearing, write_result, write_run
 from explorer.files.run_result import BenchTestResult, SimulationResult, bench_test_result, simulation_result
 from explorer.scene.file import load_scene, with_settings
-from explorer.tables.pours import RunTable
+from explorer.terminal.pours import RunTable
 from solver import Job, Record, Scene, check_scheduler, executor, run_pours
 from solver.arch import chosen
 from solver.pours.checkpoint import Checkpoint, read_checkpoint

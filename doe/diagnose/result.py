@@ -113,7 +113,7 @@ class Place(Record):
 
 @dataclass(frozen=True)
 class Level(Record):
-    """A direction with the share of its range at which it was found to shift enough (``levels.py``)."""
+    """A direction with the share of its range at which it was found to shift enough (``training_amplitudes.py``)."""
 
     direction: Direction
     share: float

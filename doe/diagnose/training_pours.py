@@ -20,9 +20,9 @@ from doe.declared.pours import ModelPours, PointPour, Search
 from doe.diagnose.budget import Budget
 from doe.diagnose.compared_features import Instrument, MeasuredFeatures
 from doe.diagnose.emulator import Lessons, Way
-from doe.diagnose.levels import STRONG, Trials, level_of, taught_shifts
 from doe.diagnose.posterior import LEAST, Posterior
 from doe.diagnose.result import Level
+from doe.diagnose.training_amplitudes import STRONG, Trials, level_of, taught_shifts
 from doe.errors import StatisticsError
 from doe.measurement.measurement import Condition
 from doe.measurement.sight import PERFECT, Sight

@@ -38,8 +38,8 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from doe.diagnose.emulator import shrunk_covariance
-from doe.diagnose.levels import REPLICATES
 from doe.diagnose.result import Level
+from doe.diagnose.training_amplitudes import REPLICATES
 from doe.errors import StatisticsError
 from doe.record import Record
 from doe.validation.reference import SIDE, ReferencePours

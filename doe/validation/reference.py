@@ -5,7 +5,7 @@ parameters at their measured means; what a parameter does is known from pours ``
 
 Pours come in rounds, each of the same number of every kind, so that a reference can be made in pieces and stopped
 after any round. First a pilot finds, for every direction of an effect, the amplitude that shifts the summaries of a
-data set by about 12 standard errors (``levels.py``).
+data set by about 12 standard errors (``training_amplitudes.py``).
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ import numpy.typing as npt
 from doe.declared.model import CandidateEffect, Declared
 from doe.declared.points import Direction, Point, directions_of, middle
 from doe.declared.pours import ModelPours
-from doe.diagnose.levels import Trials, level_of
 from doe.diagnose.result import Level
+from doe.diagnose.training_amplitudes import Trials, level_of
 from doe.errors import StatisticsError
 from doe.measurement.features import feature_set
 from doe.measurement.measurement import Measurement

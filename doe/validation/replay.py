@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.diagnose.emulator import Emulator, Lessons, Way, emulated
-from doe.diagnose.levels import REPLICATES
 from doe.diagnose.posterior import Data, Posterior, posterior
+from doe.diagnose.training_amplitudes import REPLICATES
 from doe.record import Record
 from doe.validation.limit import RISKS, DataKind
 from doe.validation.reference import SIDE, Blocks, ReferencePours

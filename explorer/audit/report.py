@@ -21,7 +21,7 @@ from explorer.report.figures.style import ASSUMPTION, CHOSEN, DUMMY, TARGET, axi
 from explorer.report.folder import write_report
 from explorer.report.html import page
 from explorer.report.methods import audit_methods
-from explorer.tables.text_table import text_table
+from explorer.terminal.text_table import text_table
 from explorer.units import MISSING
 
 HEADINGS: dict[Status, str] = {

@@ -46,7 +46,7 @@ def bench(
     from explorer.errors import CommandError
     from explorer.files.output_file import write_whole
     from explorer.files.run_folder import json_text
-    from explorer.tables.benchmark import fallen, machine, markdown, result_of, table_text
+    from explorer.terminal.benchmark import fallen, machine, markdown, result_of, table_text
 
     for name in only:
         if name not in CASES:

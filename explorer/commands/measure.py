@@ -55,7 +55,7 @@ def measure(
     from explorer.files.run_folder import appearing, json_text
     from explorer.photograph.run import measure_order, run_measure
     from explorer.photograph.target import check_targets, keep_target, write_into_study
-    from explorer.tables.photograph import measure_result, measure_text, refusal_lines
+    from explorer.terminal.photograph import measure_result, measure_text, refusal_lines
 
     order = measure_order(
         photos, scale, reference_length, reference, baseline, plot, outline, from_simulation, checkerboard

@@ -23,7 +23,7 @@ def check(
     """
     from doe.measurement import load_measurement
     from explorer.files.run_folder import json_text
-    from explorer.tables.measurement import check_result, check_text
+    from explorer.terminal.measurement import check_result, check_text
     from solver.assets import measurement_folder
 
     measurement = load_measurement(measurement_folder(folder))

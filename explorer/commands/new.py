@@ -117,7 +117,7 @@ def new(
         from explorer.files.run_folder import json_text
         from explorer.measured.folder import NewCondition, write_condition, written_text
         from explorer.measured.readings import Brought
-        from explorer.tables.measurement import check_result
+        from explorer.terminal.measurement import check_result
         from solver.assets import asset_path
 
         if scale is not None and not 0.0 < scale < float("inf"):

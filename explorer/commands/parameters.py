@@ -19,7 +19,7 @@ def parameters(
     "acts": "at once" on a running pile, "on restart" with the next pour.
     """
     from explorer.scene.file import load_scene
-    from explorer.tables.text_table import text_table
+    from explorer.terminal.text_table import text_table
     from solver import Parameter, value
     from solver import parameters as declared
 

@@ -30,7 +30,7 @@ def repeat(
     from explorer.population.run import PoursOrder, pour_more
     from explorer.scene.file import load_scene, with_settings
     from explorer.study.duration import large_pour_text
-    from explorer.tables.text_table import text_table
+    from explorer.terminal.text_table import text_table
     from solver import check_scheduler
 
     check_scheduler(scheduler, threads)

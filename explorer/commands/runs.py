@@ -16,7 +16,7 @@ def runs(
     """List or export the stored runs, with the readings of this version of the program."""
     from doe.store import Store, StoreError, default_store, observables_in_rig, observables_of, write_csv
     from explorer.errors import CommandError
-    from explorer.tables.text_table import text_table
+    from explorer.terminal.text_table import text_table
 
     path = store or default_store()
     # A store of another version of the physics has another name there.

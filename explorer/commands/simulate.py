@@ -62,7 +62,7 @@ def simulate(
     from explorer.files.run_folder import json_text
     from explorer.simulation import SimulateOrder, run_bench, run_simulation, simulation_of
     from explorer.study.duration import large_pour_text
-    from explorer.tables.pours import RunTable, bench_text
+    from explorer.terminal.pours import RunTable, bench_text
 
     end_as_by_ctrl_c()
     if json and events:

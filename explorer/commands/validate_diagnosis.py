@@ -39,7 +39,7 @@ def validate_diagnosis(
     from explorer.background.progress import SetProgress
     from explorer.background.reporter import end_as_by_ctrl_c, reporter_of
     from explorer.errors import CommandError
-    from explorer.tables.validation import campaign_text
+    from explorer.terminal.validation import campaign_text
     from solver import check_scheduler
 
     # Here --threads is for what stays on this machine: verdicts, and pours with an effect that the library lacks.

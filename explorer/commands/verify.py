@@ -61,7 +61,7 @@ def verify(
     from explorer.export.run import installed
     from explorer.files.output_file import write_whole
     from explorer.files.run_folder import json_text
-    from explorer.tables.verification import peers_text, result_of, summary_text, table_text
+    from explorer.terminal.verification import peers_text, result_of, summary_text, table_text
     from solver.verification import BY_ANY_ENGINE, FAMILIES, OURS_BY_DISPLACEMENT, verify_engine
     from solver.verification import verify as rows_of
 

@@ -31,7 +31,7 @@ from explorer.report.design.names import groups_table, means_table
 from explorer.report.design.sections import factor_table, in_short, settings_table, shape, target
 from explorer.report.design.surrogate import errors_table, lengths_table, process_settings
 from explorer.report.sections.surface import anova_table, variance_table
-from explorer.tables.text_table import text_table
+from explorer.terminal.text_table import text_table
 from explorer.units import number
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from doe.declared.model import Declared, declare
 from doe.declared.pours import Ended, ModelPours
-from doe.diagnose.levels import REPLICATES
+from doe.diagnose.training_amplitudes import REPLICATES
 from doe.measurement import Measurement, load_measurement
 from doe.measurement.features import OFFERS, feature_set
 from doe.record import plain
@@ -24,7 +24,7 @@ from doe.validation.replay import BASE_POURS, NULLS, PlantedTruth, Replayed, Tea
 from explorer.background.progress import time_left
 from explorer.files.output_file import write_whole
 from explorer.files.run_folder import json_text
-from explorer.tables.text_table import text_table
+from explorer.terminal.text_table import text_table
 from solver import EFFECTS, PHYSICS, executor
 
 TEACHINGS, SPLITS = (Teaching(4, 0), Teaching(4, 12), Teaching(8, 12)), 20

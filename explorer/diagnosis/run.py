@@ -18,8 +18,8 @@ from doe.declared.pours import measured_profile
 from doe.diagnose.budget import Budget, scaled_budget
 from doe.diagnose.confirm import CONTRADICTED, Confirmed
 from doe.diagnose.diagnosis import Diagnosis, joined, run_diagnosis
-from doe.diagnose.levels import STRONG
 from doe.diagnose.posterior import FITS, NOTHING, OUTSIDE, PAIRS
+from doe.diagnose.training_amplitudes import STRONG
 from doe.diagnose.verdict import CREDIBLE, NOTHING_AT_ONCE, NOTHING_FROM
 from doe.holdout import HoldoutError
 from doe.measurement.load import load_measurement

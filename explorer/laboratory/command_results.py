@@ -51,9 +51,9 @@ from explorer.report.figures.bench import bench_charts, curve_charts
 from explorer.report.html import page
 from explorer.report.study_charts import Plot, Plots
 from explorer.scene.source import command_line, rig_source
-from explorer.tables.laboratory import lab_text
-from explorer.tables.photograph import NOTE, Rows, measure_tables
-from explorer.tables.pours import bench_text
+from explorer.terminal.laboratory import lab_text
+from explorer.terminal.photograph import NOTE, Rows, measure_tables
+from explorer.terminal.pours import bench_text
 from solver import Scene, read_toml, with_values
 from solver.assets import asset_path, photograph_scales, shipped_assets
 from solver.photograph import open_picture

@@ -17,7 +17,7 @@ from explorer.files.run_result import made_today
 from explorer.laboratory.part import part_table, part_text, with_part
 from explorer.laboratory.twin_row import TwinRow, check_twin
 from explorer.scene.file import DEFAULT_MATERIAL, material_scene
-from explorer.tables.laboratory import bias_data, bias_text, lab_data, lab_text, twin_text
+from explorer.terminal.laboratory import bias_data, bias_text, lab_data, lab_text, twin_text
 from solver import ParameterError, Scene
 from solver.assets import asset_path
 

@@ -37,7 +37,7 @@ from explorer.scene.file import material_scene, study_path, with_settings
 from explorer.scene.source import differences
 from explorer.scene.starter_files import SPAN, check_name, factor_paths
 from explorer.scene.text import toml_key, toml_value
-from explorer.tables.measurement import check_text
+from explorer.terminal.measurement import check_text
 from solver import Scene, asset_path, parameters, pour_rig, read_toml, value
 
 FIRST = "A"

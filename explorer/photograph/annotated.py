@@ -14,7 +14,7 @@ import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
 from explorer.photograph.simulated import SimulatedPiles
-from explorer.tables.photograph import angle_text
+from explorer.terminal.photograph import angle_text
 from solver.observables.repose import flank_feet
 from solver.photograph import PhotographedPile, Picture, Refusal
 from solver.photograph.reading_error import THIRDS

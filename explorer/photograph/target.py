@@ -35,7 +35,7 @@ from explorer.files.uploads import label
 from explorer.photograph.result import MeasuredPhotographs, PhotographResult, ReadPile, photograph_result
 from explorer.report.figures.pours import Backdrop
 from explorer.study.edit import remeasured
-from explorer.tables.photograph import angle_words
+from explorer.terminal.photograph import angle_words
 from explorer.units import enumeration, fixed
 from solver.photograph import PhotographedPile, Picture, open_picture
 from solver.photograph.reading_error import COVERAGE

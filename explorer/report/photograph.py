@@ -25,7 +25,7 @@ from explorer.report.content import (
 )
 from explorer.report.figures.style import ASSUMPTION, CHOSEN, FACTOR, TARGET, axis, chart, label, line
 from explorer.report.methods import photograph_methods
-from explorer.tables.photograph import lens_words, thirds_words
+from explorer.terminal.photograph import lens_words, thirds_words
 from explorer.units import MISSING, fixed, number
 from solver.photograph import open_picture
 

@@ -15,7 +15,7 @@ from doe.studies.study import load_study, with_profile
 from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
 from explorer.files.run_folder import json_text
-from explorer.tables.text_table import text_table
+from explorer.terminal.text_table import text_table
 from solver import WorkerPool
 
 Say = Callable[[str], None]

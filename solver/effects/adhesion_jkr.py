@@ -1,4 +1,4 @@
-"""Adhesion of elastic surfaces by surface forces (JKR; formulas in ``jkr.py``), among bodies and with walls alike.
+"""Adhesion by surface forces (JKR; formulas in ``jkr_contact.py``), among bodies and with walls alike.
 
 Vanishes for a work of adhesion w → 0. The weight that one contact can hold is 3/2 π w R*, so it acts on small and light
 bodies first: Bo = 3/2 π w R*/(m g).
@@ -9,7 +9,7 @@ Source: Johnson, Kendall & Roberts 1971, Proc. R. Soc. A 324:301. Some codes tak
 from dataclasses import dataclass
 
 from solver.effects.effect import ContactEffect, Stage, Telltale
-from solver.effects.jkr import adhere, grip
+from solver.effects.jkr_contact import adhere, grip
 from solver.effects.kernel import kernel_function
 from solver.params import param
 

@@ -1,4 +1,4 @@
-"""Adhesion to the walls only (JKR; formulas in ``jkr.py``): sticky or charged surfaces, clean bodies.
+"""Adhesion to the walls only (JKR; formulas in ``jkr_contact.py``): sticky or charged surfaces, clean bodies.
 
     F = F_JKR(δ; w + w')  at walls,  F_JKR(δ; w') among bodies       w': that of ``adhesion_jkr``
 
@@ -9,7 +9,7 @@ Source: as ``adhesion_jkr``.
 from dataclasses import dataclass
 
 from solver.effects.effect import ContactEffect, Stage, Telltale
-from solver.effects.jkr import adhere, grip
+from solver.effects.jkr_contact import adhere, grip
 from solver.effects.kernel import kernel_function
 from solver.params import param
 

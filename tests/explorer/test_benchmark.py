@@ -13,7 +13,7 @@ from explorer.benchmark import POUR, Options, growth
 from explorer.cli import app
 from explorer.export.run import PeerTimeout
 from explorer.scene.file import load_scene
-from explorer.tables.benchmark import fallen, markdown, result_of, table_text
+from explorer.terminal.benchmark import fallen, markdown, result_of, table_text
 from solver.benchmark import (
     RADIUS,
     SPACING,

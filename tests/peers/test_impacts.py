@@ -5,7 +5,7 @@ from functools import cache
 import pytest
 
 from explorer.export.impacts import liggghts_engine
-from explorer.tables.verification import MISSED_ALONE, peers_text
+from explorer.terminal.verification import MISSED_ALONE, peers_text
 from solver.laws import LinearSpringDashpot
 from solver.scenes.contact_model import ContactModel
 from solver.single_body.free_world import GRAIN

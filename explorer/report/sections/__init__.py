@@ -8,9 +8,9 @@ from doe.studies.study_result import StudyResult
 from explorer.report.content import Section
 from explorer.report.methods import study_methods
 from explorer.report.sections.answer import effects, overview, parameters, piles, verification
-from explorer.report.sections.closing import further, paper, repeat, runs
 from explorer.report.sections.designs import assumptions, noise, reach, scan, screening
 from explorer.report.sections.optimum import optimum
+from explorer.report.sections.reproduction import further, paper, repeat, runs
 from explorer.report.sections.surface import ascent, surface
 from explorer.report.set_up import set_up
 

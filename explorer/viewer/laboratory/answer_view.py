@@ -14,7 +14,7 @@ from explorer.errors import CommandError
 from explorer.files.output_file import write_whole_bytes
 from explorer.laboratory.command_results import CommandResult
 from explorer.project.project import REPORT
-from explorer.tables.photograph import Rows
+from explorer.terminal.photograph import Rows
 from explorer.viewer.actions import Post
 from explorer.viewer.output.send_file import send_files
 from explorer.viewer.study.plot_view import PlotView

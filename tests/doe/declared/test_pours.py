@@ -12,8 +12,8 @@ from doe.declared.model import Declared, DeclaredCondition
 from doe.declared.points import Point
 from doe.declared.pours import ModelPours, PointPour
 from doe.diagnose.confirm import confirm
-from doe.diagnose.levels import whitened_shift
 from doe.diagnose.result import CalibratedModel
+from doe.diagnose.training_amplitudes import whitened_shift
 from doe.measurement import summary_names
 from doe.measurement.features import feature_set
 from doe.store import Store

@@ -20,9 +20,9 @@ from doe.diagnose import diagnosis, training_pours
 from doe.diagnose.budget import LEAST, Budget, scaled_budget
 from doe.diagnose.compared_features import MeasuredFeatures
 from doe.diagnose.confirm import CONTRADICTED
-from doe.diagnose.levels import REPLICATES, whitened_shift
 from doe.diagnose.posterior import BestAmplitude
 from doe.diagnose.result import CalibratedModel, Level
+from doe.diagnose.training_amplitudes import REPLICATES, whitened_shift
 from doe.diagnose.training_pours import TrainingPours
 from doe.errors import StatisticsError
 from doe.measurement import load_measurement, summary_names

@@ -9,8 +9,8 @@ from scipy.stats import norm
 from doe.declared.model import CalibratedParameter, CandidateEffect, Declared, DeclaredCondition
 from doe.declared.points import Direction, base_points, effect_points
 from doe.declared.pours import PointPour
-from doe.diagnose.levels import STRONG, Trials, level_of
 from doe.diagnose.result import Level
+from doe.diagnose.training_amplitudes import STRONG, Trials, level_of
 from doe.validation.limit import (
     RISK,
     RISKS,

@@ -23,7 +23,7 @@ from doe.validation.sets import (
     targets,
     wilson,
 )
-from explorer.tables.validation import campaign_text
+from explorer.terminal.validation import campaign_text
 
 NAN = math.nan
 

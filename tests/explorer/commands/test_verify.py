@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from explorer.tables.verification import (
+from explorer.terminal.verification import (
     HEADER,
     MISSED_ALONE,
     curves,

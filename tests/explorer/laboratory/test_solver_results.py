@@ -20,7 +20,7 @@ from explorer.laboratory.command_results import (
 )
 from explorer.laboratory.run import LabOrder
 from explorer.scene.file import load_scene
-from explorer.tables.photograph import measure_result
+from explorer.terminal.photograph import measure_result
 from explorer.viewer.output.engine_export import packed_export
 from solver import load_material, with_values
 from tests.explorer.command_line import explorer

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.effects import EFFECTS
-from solver.effects.jkr import grip
+from solver.effects.jkr_contact import grip
 from solver.scenes.body import Body, Members
 from solver.scenes.material import effective_youngs_modulus
 from solver.single_body.free_world import GRAIN, RADIUS, WALL, FreeWorld, grain_on_plate

@@ -13,7 +13,7 @@ from typing import Any
 
 from explorer.benchmark import FEW, LONG, TO_REST, Result, growth, results
 from explorer.files.run_result import package_version
-from explorer.tables.text_table import text_table
+from explorer.terminal.text_table import text_table
 from solver.benchmark import BenchmarkResult
 
 HEADER = (

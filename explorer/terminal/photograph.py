@@ -10,7 +10,7 @@ import numpy as np
 
 from explorer.photograph.result import BASES, MeasuredPhotographs
 from explorer.photograph.simulated import SimulatedViews, Spread
-from explorer.tables.text_table import text_table
+from explorer.terminal.text_table import text_table
 from explorer.units import MISSING, fixed, signed
 from solver.photograph import Board, PhotographedPile, Refusal
 from solver.photograph.reading_error import COVERAGE, Angle

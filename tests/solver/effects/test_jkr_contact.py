@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq
 
 from solver.backend import ti
-from solver.effects.jkr import grip, pulls, root
+from solver.effects.jkr_contact import grip, pulls, root
 from solver.scenes.material import effective_youngs_modulus
 from solver.single_body.free_world import GRAIN, RADIUS, WALL, FreeWorld, sphere
 from tests.solver.effects.cases import felt, heavy, scene_with

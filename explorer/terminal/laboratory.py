@@ -12,7 +12,7 @@ from doe.laboratory.hertz import HertzRange
 from doe.laboratory.linear_range import LinearRange
 from doe.laboratory.result import CONDITIONS
 from explorer.laboratory.twin_row import CLOSES, TwinRow
-from explorer.tables.text_table import text_table
+from explorer.terminal.text_table import text_table
 from explorer.units import entry_unit
 
 PERCENT = ("moisture_wet_basis", "moisture_dry_basis")

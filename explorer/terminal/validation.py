@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from doe.validation.sets import RISKS, Answer, Rate, Scores, SetRow, Tempered, by_temperature, scores, targets
-from explorer.tables.text_table import text_table
+from explorer.terminal.text_table import text_table
 
 ANSWERS: tuple[Answer, ...] = ("nothing", "right", "undecided", "unexplained", "wrong")
 

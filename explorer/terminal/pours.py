@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from explorer.files.run_result import BenchTestResult, EnergyAccount, SimulationResult
-from explorer.tables.text_table import table_line, text_table
+from explorer.terminal.text_table import table_line, text_table
 from solver import Record
 from solver.observables import Value, observable_names, observe
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from explorer.files.run_result import versions
-from explorer.tables.text_table import text_table
+from explorer.terminal.text_table import text_table
 from solver.verification import OURS_BY_DISPLACEMENT, Row
 
 HEADER = ("test", "quantity", "points", "at", "reference", "ours", "error %", "limit %", "of", "ok")

@@ -10,7 +10,7 @@ import numpy as np
 from doe.measurement import Condition, Measurement, Observation, Reach, reach_of
 from doe.measurement.features import PROFILE, SCAN, feature_set, offer_of, resolution
 from doe.record import plain
-from explorer.tables.text_table import text_table
+from explorer.terminal.text_table import text_table
 
 CALIBRATED = "free parameters"
 
