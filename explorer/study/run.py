@@ -116,22 +116,27 @@ def run_study(order: StudyOrder, reporter: Reporter) -> StudyResult:
         check_recordings(order.record, order.resume)
     # A recorder watches pours from within; all others run in processes of their own.
     apart = order.record is None and chosen() == "cpu"
-    # The executor before anything is in the folder: perhaps no scheduler answers.
+    # Both before anything is in the folder: a stage may refuse its table, and perhaps no scheduler answers.
+    planned = planned_runs(study, profile)
     with kept_for_one(order.out), executor(order.threads, order.scheduler) if apart else nullcontext() as pool:
         reporter.begin(order.out, order.resume)
-        return _run(order, study, profile, photographed, pool, reporter)
+        return _run(order, study, profile, planned, photographed, pool, reporter)
 
 
 def _run(
     order: StudyOrder,
     study: Study,
     profile: Profile,
+    planned: dict[str, int],
     photographed: PhotographedTarget | None,
     pool: Executor | None,
     reporter: Reporter,
 ) -> StudyResult:
-    """Pour, analyse and write into ``order.out``, which is there and this command's alone."""
-    say, planned = reporter.say, planned_runs(study, profile)
+    """Pour, analyse and write into ``order.out``, which is there and this command's alone.
+
+    ``planned`` are the runs that each stage will make.
+    """
+    say = reporter.say
     path = order.store or default_store()
     store = Store(path)
     if photographed is not None:

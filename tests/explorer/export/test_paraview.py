@@ -11,6 +11,7 @@ from explorer.errors import CommandError
 from explorer.export.paraview import PourState, collection, contact_grid, moments, rig_grid, shape_grid, write_paraview
 from explorer.scene.file import load_scene, with_settings
 from solver.pours.contacts import Contacts
+from solver.pours.record import Outcome
 from tests.explorer.command_line import TINY, explorer, refused, settings
 
 
@@ -83,7 +84,7 @@ def test_contacts_of_a_pile_at_rest_carry_its_weight(taichi):
     values = TINY | {"rig.mass": "3g", "numerics.max_time": "8s", "numerics.rayleigh_fraction": "0.4"}
     scene = with_settings(load_scene("funnel"), [f"{path}={value}" for path, value in values.items()])
     (moment,), record = moments(scene, 1, None)
-    assert record.outcome.valid
+    assert record.outcome in {Outcome.AT_REST, Outcome.NO_HEAP}  # so few bodies are a flat layer
     contacts, weight = moment.contacts, 9.81 * moment.bodies.mass
     force = np.zeros((len(weight), 3))
     np.add.at(force, contacts.body, contacts.force)

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from doe.errors import StudyFileError
 from doe.pour_runner import TRIES
 from doe.studies.study_result import OWN_STAGES, Stages
 from explorer.background.output_folder import kept_for_one
@@ -179,6 +180,17 @@ def test_bad_orders_are_one_line_and_leave_nothing(tmp_path, options, says):
     refused = calibrate(tmp_path, *options)
     assert refused.exit_code == 2
     assert says in refused.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_stage_that_refuses_its_table_leaves_no_folder(tmp_path, monkeypatch):
+    def refuse(study, profile):
+        raise StudyFileError("stage.repeatability: {'runs': 1}; allowed: runs, a whole number of at least 2")
+
+    monkeypatch.setattr(study_run, "planned_runs", refuse)
+    found = calibrate(tmp_path)
+    assert found.exit_code == 2
+    assert "allowed: runs" in found.output
     assert not (tmp_path / "out").exists()
 
 
