@@ -9,6 +9,8 @@ for λ → 0. The force ends at δ = λ^{2/3} δ_max, so that of the energy put 
     e² = (1 − 5/2 λ + 3/2 λ^{5/3})/(1 − λ)
 
 comes back, at any speed (with forces linear in δ it would be 1 − λ): e = 0.82, 0.67, 0.42 for λ = 0.25, 0.5, 0.8.
+Unloading is 1/(1 − λ) times as stiff, but takes no shorter step: where the branches meet the force is continuous, and
+less energy comes back through fewer steps. Impacts are as exact as without the effect (``tests/solver/effects``).
 Source: Walton & Braun 1986, Journal of Rheology 30:949; the exponent 3/2 and λ as in the Edinburgh elasto-plastic
 adhesion model (Morrissey 2013, thesis, Edinburgh), without its adhesive branch.
 """
@@ -45,12 +47,7 @@ class PlasticContact(ContactEffect):
     literature = "λ = 0.2–0.8 for food and soft plant material in EEPA calibrations"
     lever = "drop test at several heights: a rebound lower than the damping explains, and alike at every speed"
     telltales = (Telltale.SHAPE,)
-    revision = 2
+    revision = 3
     stage = Stage.NORMAL
     act = staticmethod(unload_stiffer)
     memory = 1
-
-    @property
-    def stiffening(self) -> float:
-        """Unloading is 1/(1 − λ) times as stiff."""
-        return 1.0 / (1.0 - self.plasticity)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from solver.effects.plastic_contact import PlasticContact
 from solver.engine.world import Batch
 from solver.params import ParameterError
 from solver.pours.checkpoint import checkpoint_bytes, checkpoint_of, read_checkpoint, resumed
@@ -10,6 +11,7 @@ from solver.pours.pour import Pour
 from solver.pours.run import capacity_for
 from solver.scenes.material_file import load_material
 from solver.scenes.scene import with_values
+from solver.scenes.time_step import time_step
 from solver.single_body.free_world import ROOM
 from tests.solver.effects.cases import ROOM_WITH_EFFECTS, felt, with_effects
 
@@ -96,7 +98,10 @@ def test_it_cannot_be_switched_on_where_it_is_not_compiled():
         pour.ramp_to(MOIST)
 
 
-def test_a_stiffer_contact_takes_a_shorter_step():
-    pour = Pour(Batch(ROOM), 0, HEAP, 5)
-    plastic = Pour(Batch(ROOM_WITH_EFFECTS), 0, with_effects(HEAP, felt("plastic_contact", plasticity=0.75)), 5)
-    assert plastic.dt == pytest.approx(0.5 * pour.dt)
+class Stiffer(PlasticContact):
+    stiffening = 4.0
+
+
+def test_an_effect_that_stiffens_contacts_takes_a_shorter_step_and_a_plastic_contact_does_not():
+    assert time_step(with_effects(HEAP, Stiffer(plasticity=0.75))) == pytest.approx(0.5 * time_step(HEAP))
+    assert time_step(with_effects(HEAP, felt("plastic_contact", plasticity=0.75))) == time_step(HEAP)

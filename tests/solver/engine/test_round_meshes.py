@@ -14,6 +14,7 @@ import dataclasses
 import numpy as np
 import pytest
 import trimesh
+from scipy import stats
 
 from solver.observables import observe
 from solver.pours.record import Outcome
@@ -141,7 +142,12 @@ class FacetedFunnel(Funnel):
 @pytest.mark.slow
 @pytest.mark.parametrize("sections", [64, 128, 256])
 def test_a_pour_through_a_meshed_funnel_is_one_through_the_cone(sections):
-    """Facets of 5.6°, 2.8° and 1.4°: discharge, height and footprint of 32 piles each within two standard errors."""
+    """Facets of 5.6°, 2.8° and 1.4°: discharge, height and footprint of 32 piles each, beside those of the cone.
+
+    Of 15 comparisons one in a hundred runs may exceed the limit where nothing differs (Bonferroni). At 128 sections the
+    angles are 2.2 standard errors apart with these seeds, and 0.1 with 64 others.
+    """
+    limit = stats.norm.isf(0.01 / (2 * 15))
     heap = with_values(QUICK, {"rig.mass": "12g", "rig.outlet_diameter": "45mm", "insertion.rate": "100g/s"})
     dimensions = {field.name: getattr(heap.rig, field.name) for field in dataclasses.fields(heap.rig)}
     faceted = dataclasses.replace(heap, rig=FacetedFunnel(**dimensions, sections=sections))
@@ -149,7 +155,7 @@ def test_a_pour_through_a_meshed_funnel_is_one_through_the_cone(sections):
     for name in both[0]:
         one, two = (pours[name] for pours in both)
         error = np.sqrt(one.var(ddof=1) / len(one) + two.var(ddof=1) / len(two))
-        assert abs(one.mean() - two.mean()) < 2.0 * error, name
+        assert abs(one.mean() - two.mean()) < limit * error, name
 
 
 def statistics(scene):
