@@ -18,6 +18,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Generic, TypeVar
 
 GROUP = "repose_explorer.plugins"
+KINDS = ("contact_law", "design", "effect", "export", "observable", "panel", "rig", "stage")
 T = TypeVar("T")
 
 
@@ -55,8 +56,9 @@ class Registry(Mapping[str, T], Generic[T]):
     def _loaded(self, name: str, entry: EntryPoint) -> T:
         try:
             thing: T = entry.load()
-        except (ImportError, AttributeError) as error:
-            raise PluginError(f"{described(entry)}: cannot be loaded: {error}") from error
+        except Exception as error:  # a package that breaks while it is imported raises anything
+            why = next(iter(str(error).splitlines()), "") or type(error).__name__
+            raise PluginError(f"{described(entry)}: cannot be loaded: {why}") from error
         if not self._fits(thing):
             raise PluginError(f"{described(entry)}: {entry.value} is no {self.kind.replace('_', ' ')}")
         if getattr(thing, "name", None) != name:
@@ -98,8 +100,19 @@ def plugged_in(kind: str) -> dict[str, EntryPoint]:
 
 @lru_cache
 def _installed() -> dict[tuple[str, str, str], EntryPoint]:
-    """Every entry point of the group by its name in three parts, read once: it takes 10 ms."""
-    return {entry.name.partition("."): entry for entry in sorted(entry_points(group=GROUP), key=lambda one: one.name)}
+    """Every entry point of the group by its name in three parts, read once: it takes 10 ms.
+
+    Raises PluginError for a kind that there is not, and for a thing of two packages.
+    """
+    found: dict[tuple[str, str, str], EntryPoint] = {}
+    for entry in sorted(entry_points(group=GROUP), key=lambda one: one.name):
+        parts = entry.name.partition(".")
+        if parts[0] not in KINDS:
+            raise PluginError(f"{described(entry)}: {parts[0]!r} is no kind; allowed: {', '.join(KINDS)}")
+        if parts in found:
+            raise PluginError(f"{described(entry)}: {_package(found[parts])} adds one of that name; remove one of both")
+        found[parts] = entry
+    return found
 
 
 def origin(kind: str, name: str) -> str:

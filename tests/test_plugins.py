@@ -286,15 +286,32 @@ print(json.dumps([pour_key(scene, 1), pour_key(dragged, 1), pour_key(with_rig(sc
         ("effect.stokes_drag", "repose_plugins.stokes_drag:Stokes", "cannot be loaded"),
         ("effect.stokes_drag", "repose_plugins.nowhere:StokesDrag", "cannot be loaded: No module named"),
         ("effect.stokes_drag", "repose_plugins.one_at_a_time:DESIGN", "is no effect"),
+        ("effect.stokes_drag", "repose_plugins.broken:StokesDrag", "cannot be loaded: division by zero"),
+        ("effects.stokes_drag", "repose_plugins.stokes_drag:StokesDrag", "'effects' is no kind; allowed: contact_law"),
     ],
 )
 def test_a_plug_in_that_cannot_be_used_is_one_line_that_names_it(tmp_path, entry, value, message):
     site = installed(tmp_path / "site", entries={entry: value})
+    (site / "repose_plugins" / "broken.py").write_text("1 / 0\n")
     done = python(site, "-m", "explorer", "parameters")
     assert done.returncode == 2
     assert done.stderr.startswith(f"error: plug-in {entry} of repose-plugins 1.0: ")
     assert message in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_thing_of_two_packages_is_refused(site, tmp_path):
+    """Otherwise which of the two acts hangs on the order of folders."""
+    entry = "effect.stokes_drag"
+    other = tmp_path / "other"
+    info = other / "other_plugins-2.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: other-plugins\nVersion: 2.0\n")
+    (info / "entry_points.txt").write_text(f"[{GROUP}]\n{entry} = repose_plugins.stokes_drag:StokesDrag\n")
+    done = python(os.pathsep.join([str(site), str(other)]), "-m", "explorer", "parameters")
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"error: plug-in {entry} of ")
+    assert all(name in done.stderr for name in ("other-plugins 2.0", "repose-plugins 1.0", "adds one of that name"))
 
 
 def test_a_module_of_a_package_may_be_imported_first(site):

@@ -10,12 +10,17 @@ import typer
 if TYPE_CHECKING:
     from solver.benchmark import BenchmarkResult
 
+USUAL_DURATION = 4.0
+"""Of the pour [s]."""
+
 
 def bench(
     only: list[str] = typer.Option(
         [], metavar="CASE", help="Only this case: short, pour, bed or batch; may be repeated."
     ),
-    duration: float = typer.Option(4.0, metavar="S", help="Simulated time of the pour [s].", min=0.2, max=30.0),
+    duration: float = typer.Option(
+        USUAL_DURATION, metavar="S", help="Simulated time of the pour [s].", min=0.2, max=30.0
+    ),
     spheres: list[int] = typer.Option(
         [], metavar="N", help="Beds to run: 1000, 10000, 100000 (these are the usual ones), 1000000; may be repeated."
     ),
@@ -54,6 +59,10 @@ def bench(
     for n in spheres:
         if n not in BEDS:
             raise CommandError(f"--spheres: {n} is not one of {', '.join(map(str, BEDS))}")
+    if spheres and only and "bed" not in only:
+        raise CommandError("--spheres: belongs to the case bed, which --only leaves out")
+    if duration != USUAL_DURATION and only and "pour" not in only:
+        raise CommandError("--duration: belongs to the case pour, which --only leaves out")
     for option, path in (("--json", json), ("--table", table)):
         if path and not path.absolute().parent.is_dir():
             raise CommandError(f"{option}: {path}: no folder {path.absolute().parent}")
@@ -67,7 +76,7 @@ def bench(
     measurements: list[BenchmarkResult] = []
     before = machine()
     words = [*(f"--only {name}" for name in only), *(f"--spheres {n}" for n in spheres)]
-    words += [f"--duration {duration:g}"] if duration != 4.0 else []
+    words += [f"--duration {duration:g}"] if duration != USUAL_DURATION else []
     words += [f"--rounds {rounds}"] if rounds != 5 else []
 
     def keep(complete: bool) -> None:

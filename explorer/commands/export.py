@@ -9,6 +9,9 @@ import typer
 
 from explorer.commands.listing import Listing
 
+SHORTEST, LONGEST = 0.1, 3600.0
+"""Simulated time of an exported pour [s]; that of one here is 0.1 … 60 s."""
+
 
 class Programs(Listing):
     """Lists the programs."""
@@ -32,8 +35,10 @@ def export(
     to: str = typer.Option(..., metavar="PROGRAM", help="One of the programs below."),
     material: str | None = typer.Option(None, help="Material in the rig: file or shipped name."),
     set_: list[str] = typer.Option([], "--set", metavar="PATH=VALUE", help="Set a parameter; may be repeated."),
-    seed: int = typer.Option(1, min=0, help="Seed of the pour."),
-    time: float | None = typer.Option(None, min=0.0, help="Simulated time in s; that of our pour by default."),
+    seed: int | None = typer.Option(None, min=0, help="Seed of the pour; 1 if not given."),
+    time: float | None = typer.Option(
+        None, min=SHORTEST, max=LONGEST, help="Simulated time in s; that of our pour by default."
+    ),
     every: float | None = typer.Option(
         None, min=1e-3, max=60.0, metavar="S", help="A moment every so many simulated s, not the last one only."
     ),
@@ -50,7 +55,7 @@ def export(
     from explorer.files.run_folder import appearing
     from explorer.scene.file import named_scene, with_settings
     from explorer.study.duration import large_pour_text
-    from solver import value
+    from solver import ParameterError, value, with_values
 
     if to not in EXPORTS:
         raise CommandError(f"--to {to}: not a program; allowed: {', '.join(EXPORTS)}")
@@ -58,15 +63,20 @@ def export(
     if every is not None and "every" not in target.options:
         takers = " or ".join(name for name, one in EXPORTS.items() if "every" in one.options)
         raise CommandError(f"--every: belongs to --to {takers}, not to {to}")
+    if target.of_material and (time is not None or seed is not None):
+        raise CommandError(f"--time, --seed: of a pour, and --to {to} takes the material alone")
     scene, caution = named_scene(source, material)
     if caution:
         typer.echo(f"note: {caution}", err=True)
     scene = with_settings(scene, set_)
     if time is not None and time < float(value(scene, "numerics.max_time")):
-        scene = with_settings(scene, [f"numerics.max_time={time!r}"])
+        try:
+            scene = with_values(scene, {"numerics.max_time": time})
+        except ParameterError as error:
+            raise CommandError(f"--time {time:g}: {error}") from None
     target.check(scene)
     if target.pours and (large := large_pour_text(scene)):
         typer.echo(large, err=True)
     with appearing(folder, "DIR") as temporary:
-        told = target.write(temporary, ExportOrder(scene, seed, time, every))
+        told = target.write(temporary, ExportOrder(scene, 1 if seed is None else seed, time, every))
     typer.echo(f"{folder}: {told}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import typer
@@ -60,6 +61,7 @@ def measure(
     order = measure_order(
         photos, scale, reference_length, reference, baseline, plot, outline, from_simulation, checkerboard
     )
+    _refuse_twins(order.pictures)
     if report is not None:
         check_vacant(report, "--report")
     study = target if target is not None and target.suffix == ".toml" and not target.is_dir() else None
@@ -92,3 +94,13 @@ def measure(
         typer.echo(line, err=True)
     if measured.refusals:
         raise typer.Exit(FAILURE)
+
+
+def _refuse_twins(pictures: Sequence[Path]) -> None:
+    """Raise CommandError where a picture stands twice, under whatever name: a pile would be counted as two."""
+    from explorer.errors import CommandError
+
+    seen: dict[bytes, Path] = {}
+    for picture in pictures:
+        if (twin := seen.setdefault(picture.read_bytes(), picture)) is not picture:
+            raise CommandError(f"{picture}: is the same picture as {twin}; name each pile once")

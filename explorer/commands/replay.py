@@ -24,6 +24,8 @@ def replay(
 
     if native and static:
         raise CommandError("--native and --static exclude each other")
+    if (native or static) and (port or no_browser):
+        raise CommandError("--port, --no-browser: belong to the page, which --native and --static do without")
     check_recording(recording)
     if native:
         open_native(recording)

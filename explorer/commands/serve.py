@@ -24,7 +24,7 @@ def serve(
     study: str | None = typer.Option(None, help="Study for the page's calibration: file or shipped name."),
     material: str | None = typer.Option(None, help="Material to pour and calibrate: file or shipped name."),
     set_: list[str] = typer.Option([], "--set", metavar="PATH=VALUE", help="Set a parameter; may be repeated."),
-    seed: int = typer.Option(1, min=0, help="Seed of the first pour."),
+    seed: int | None = typer.Option(None, min=0, help="Seed of the first pour; 1 if not given."),
     store: Path | None = typer.Option(None, help="SQLite file that keeps the runs of the page's calibration."),
     record: Path | None = typer.Option(
         None,
@@ -48,7 +48,7 @@ def serve(
     from solver import check_scheduler
 
     check_scheduler(scheduler)
-    if replay and (project or study or material or set_ or record or rerun or scheduler):
+    if replay and (project or study or material or set_ or record or rerun or scheduler or store or seed is not None):
         raise CommandError(f"--replay {replay}: a recording has its own material and parameters; leave the others out")
     if replay:
         replay_page(replay, host=host, port=port, token=token)
@@ -69,7 +69,7 @@ def serve(
         scene,
         host=host,
         port=port,
-        seed=seed,
+        seed=1 if seed is None else seed,
         store=store,
         record_path=record,
         rerun_viewer=rerun or "",

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
 USUAL_POURS = 241
 """So many of each kind make an equivalence test of margin 0.3 SD with a power of 0.9."""
+USUAL_LIMIT = 120.0
+"""Of a run of LIGGGHTS [s]."""
 
 
 def verify(
@@ -23,8 +25,8 @@ def verify(
         "--peers",
         help="Run T4, T5, T6, T8 in LIGGGHTS and by its law, beside what ours misses.",
     ),
-    peer_limit: float = typer.Option(
-        120.0, metavar="S", help="Wall time after which a run of LIGGGHTS is stopped [s].", min=1.0
+    peer_limit: float | None = typer.Option(
+        None, metavar="S", help="With --peers: wall time after which a run of LIGGGHTS is stopped [s]; 120.", min=1.0
     ),
     economy: str | None = typer.Option(
         None, metavar="STUDY", help="Compare piles with and without an economy of the method, for this study instead."
@@ -47,6 +49,8 @@ def verify(
 
     if json and not json.absolute().parent.is_dir():
         raise CommandError(f"--json: {json}: no folder {json.absolute().parent}")
+    if peer_limit is not None and not peers:
+        raise CommandError("--peer-limit: belongs to --peers")
     if economy is not None:
         if only or peers or every:
             raise CommandError("--economy: compares piles and nothing else; leave --only, --peers and --all out")
@@ -85,7 +89,7 @@ def verify(
     keep({})
     typer.echo(table_text(rows, every))
     if peers:
-        engine = liggghts_engine(peer_limit)
+        engine = liggghts_engine(peer_limit or USUAL_LIMIT)
         beside = {one.name: list(verify_engine(one, shared)) for one in (engine, OURS_BY_DISPLACEMENT)}
         keep(beside)
         typer.echo(peers_text(rows, beside))

@@ -215,7 +215,7 @@ def assembled(
     meshes: tuple[DeckMesh, ...] = (),
 ) -> Deck:
     """A deck with the materials and bodies of ``scene`` that enter as ``entries`` say, and whatever walls are given."""
-    friction, restitution = _pair_tables(scene)
+    friction, restitution = pair_tables(scene)
     wall = scene.material(scene.rig.wall)
     return Deck(
         title=scene.title,
@@ -259,7 +259,7 @@ def _clumps(scene: Scene) -> tuple[DeckClump, ...]:
     return tuple(clumps)
 
 
-def _pair_tables(scene: Scene) -> tuple[Array, Array]:
+def pair_tables(scene: Scene) -> tuple[Array, Array]:
     """Friction and restitution of all classes; wall against wall, which never meet, get those of the first body."""
     n, wall = len(scene.bodies), scene.rig.wall
     others: tuple[Body | str, ...] = (*scene.bodies, wall)

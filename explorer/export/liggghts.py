@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 from explorer.errors import CommandError
-from explorer.export.deck import Deck, DeckClump, DeckTarget, write_deck, write_stl
+from explorer.export.deck import Deck, DeckClump, DeckTarget, pair_tables, write_deck, write_stl
 from explorer.export.frames import FINAL, TRAJECTORY
 from explorer.export.readme import write_readme
 from solver.effects.rolling_resistance import RollingResistance
@@ -89,10 +89,12 @@ class Liggghts(DeckTarget):
     laws = (HertzMindlin.name, LinearSpringDashpot.name)
 
     def check(self, scene: Scene) -> None:
-        """Raise :class:`CommandError` for what a deck cannot hold, and for bodies of one sphere."""
+        """Raise :class:`CommandError` for what a deck cannot hold, for bodies of one sphere and low restitutions."""
         super().check(scene)
-        for body in actual(scene).bodies:
+        scene = actual(scene)
+        for body in scene.bodies:
             _check_clump(body.name, len(body.clump.radii))
+        _replaced(pair_tables(scene)[1])
 
     def write_deck(self, folder: Path, deck: Deck) -> None:
         """Write a deck into an existing folder."""
@@ -122,12 +124,7 @@ class ContactSettings:
         Raises :class:`CommandError` where a restitution is too low for LIGGGHTS.
         """
         n = len(moduli)
-        replaced = np.vectorize(unclamped_restitution, otypes=[float])(restitution)
-        if replaced.min() <= LEAST_RESTITUTION:
-            raise CommandError(
-                f"restitution {restitution.min():g}: LIGGGHTS needs more than {LEAST_RESTITUTION:g} after its damping "
-                "is matched to ours; allowed: 0.22 … 1"
-            )
+        replaced = _replaced(restitution)
         return [
             *_confirmations(moduli),
             f"fix youngs all property/global youngsModulus peratomtype {_row(moduli)}",
@@ -252,8 +249,10 @@ def _input(deck: Deck) -> list[str]:
     ratios = [*(clump.poisson_ratio for clump in deck.clumps), deck.wall_poisson_ratio]
     wall, law = len(moduli), ContactSettings(deck.rolling_friction, deck.law, deck.characteristic_velocity)
     largest = max(float(clump.radii.max()) for clump in deck.clumps)
+    # Of several lines it would go on as commands.
+    title = " ".join(deck.title.split())
     return [
-        f"# {deck.title}, seed {deck.seed}: {deck.bodies} bodies, {deck.steps} steps of {deck.dt:.6g} s",
+        f"# {title}, seed {deck.seed}: {deck.bodies} bodies, {deck.steps} steps of {deck.dt:.6g} s",
         *settings_lines(deck.box, wall, SKIN * largest),
         f"neigh_modify binsize {CELL * largest:.12g}",
         *law.pair_lines(moduli, ratios, deck.restitution, deck.friction),
@@ -268,6 +267,17 @@ def _input(deck: Deck) -> list[str]:
         *_runs(deck, law),
         WRITE_FINAL,
     ]
+
+
+def _replaced(restitution: Array) -> Array:
+    """What stands for restitutions there; :class:`CommandError` where one is too low for LIGGGHTS."""
+    replaced: Array = np.vectorize(unclamped_restitution, otypes=[float])(restitution)
+    if replaced.min() <= LEAST_RESTITUTION:
+        raise CommandError(
+            f"restitution {restitution.min():g}: LIGGGHTS needs more than {LEAST_RESTITUTION:g} after its damping "
+            "is matched to ours; allowed: 0.22 … 1"
+        )
+    return replaced
 
 
 def _check_clump(name: str, spheres: int) -> None:

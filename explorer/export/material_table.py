@@ -77,7 +77,7 @@ class Edem(ExportTarget):
     """EDEM as a target of an export."""
 
     name, what = "edem", "tables of the material"
-    pours = False
+    pours, of_material = False, True
 
     def check(self, scene: Scene) -> None:
         """Take everything: what the tables cannot hold is named in them."""

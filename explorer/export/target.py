@@ -33,6 +33,8 @@ class ExportTarget(Protocol):
     """What it gets, in a few words: for the help of the command, and the page."""
     pours: bool = True
     """Whether the pour runs here first."""
+    of_material: bool = False
+    """Whether it takes nothing of a pour, neither its seed nor its time."""
     options: tuple[str, ...] = ()
     """Options of the command that not every target takes: ``every``."""
     extra: str = ""

@@ -118,8 +118,8 @@ def _edem_bodies(path: Path, found: Found, material_of: dict[str, str], table: R
         cells = dict(zip((key for key, _ in table.columns), row, strict=False))
         if not cells.get("material"):
             raise CommandError(f"{path}: {row[0]}: material is missing")
-        material_of[cells["body"]] = cells["material"]
-        body: dict[str, Any] = {"material": cells["material"]}
+        material_of[cells["body"]] = material = _name(cells["material"])
+        body: dict[str, Any] = {"material": material}
         if cells.get("mass_fraction"):
             body["mass_fraction"] = _cell(path, "mass_fraction", cells["mass_fraction"], "")
         found.bodies[cells["body"]] = body
@@ -142,7 +142,7 @@ def _edem_numbers(
             found.notes.append(f"{key}: no counterpart, not taken")
     for row in table.rows:
         names = row[:width] if width == 2 else [part.strip() for part in row[0].split(":")]
-        names = [re.sub(r"[.\s]+", "_", material_of.get(name, name)) for name in names]
+        names = [_name(material_of.get(name, name)) for name in names]
         for (key, unit), text in zip(table.columns[width:], row[width:], strict=False):
             if key not in EDEM_KEYS or not text:
                 continue
@@ -154,6 +154,11 @@ def _edem_numbers(
                 found.pairs.setdefault(frozenset(names), {})[ours] = value
             else:
                 found.materials.setdefault(names[0], {})[ours] = value
+
+
+def _name(name: str) -> str:
+    """As a path has it: no blank, no dot."""
+    return re.sub(r"[.\s]+", "_", name)
 
 
 def _cell(path: Path, where: str, text: str, unit: str) -> float:

@@ -197,7 +197,7 @@ class PourLog:
         Its mesh is there only while it has bodies: the viewer draws a mesh without poses where it is.
         """
         body = self._scene.bodies[k]
-        entity = f"world/bodies/{body.name}"
+        entity = f"world/bodies/{rr.escape_entity_path_part(body.name)}"
         mine = poses.component == k
         chosen = mine & poses.inside
         if not chosen.any():

@@ -1,11 +1,15 @@
 """A recording read back, as `pour_log` wrote it.
 
-A file of a killed writer is read up to the last frame that was written out.
+A file of a killed writer, or one that is cut off, is read up to the last frame that was written out.
 """
 
 from __future__ import annotations
 
+import re
+import struct
+import tempfile
 import tomllib
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa  # type: ignore[import-untyped]
-from rerun.chunk import RrdReader
+from rerun.chunk import Chunk, RrdReader
 
 from explorer.errors import CommandError
 from explorer.recordings.blueprint import CURVES, TIMELINE, curve_entity
@@ -33,6 +37,11 @@ from explorer.recordings.replay import check_recording
 from solver.scenes.material_file import scene_from
 from solver.scenes.scene import Scene
 
+FILE_HEADER, MESSAGE, END_OF_FILE = 12, struct.Struct("<QQ"), 0
+"""Of rerun's files: bytes before the first message, kind and length before every one, the kind of the last one."""
+ESCAPED = re.compile(r"\\u\{([0-9A-Fa-f]+)\}|\\(.)")
+"""How a letter stands in an entity's path that has a meaning there."""
+CONTROLS = {"n": "\n", "r": "\r", "t": "\t"}
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 
@@ -110,7 +119,7 @@ def _below(under: str, found: Mapping[str, dict[str, _Rows]]) -> dict[str, dict[
 def _columns(path: Path) -> dict[str, dict[str, _Rows]]:
     """Entity → component → rows, in order of time, and of writing where times are equal."""
     parts: dict[str, dict[str, list[_Rows]]] = {}
-    for chunk in RrdReader(str(path)).stream():
+    for chunk in _chunks(path):
         batch = chunk.to_record_batch()
         times = _times(batch, chunk.is_static)
         if times is None:
@@ -123,6 +132,34 @@ def _columns(path: Path) -> dict[str, dict[str, _Rows]]:
     return {
         entity: {name: _joined(rows) for name, rows in columns.items()} for entity, columns in sorted(parts.items())
     }
+
+
+def _chunks(path: Path) -> list[Chunk]:
+    """The chunks of ``path``; of a file that ends within a message those before it, which rerun's reader refuses."""
+    with warnings.catch_warnings():
+        # A file that nobody closed.
+        warnings.filterwarnings("ignore", "RRD file has no footer")
+        try:
+            return list(RrdReader(str(path)).stream())
+        except RuntimeError:
+            whole = _whole_messages(path)
+            if not whole:
+                raise
+        with tempfile.TemporaryDirectory(prefix="explorer-recording-") as folder:
+            kept = Path(folder) / path.name
+            kept.write_bytes(whole)
+            return list(RrdReader(str(kept)).stream())
+
+
+def _whole_messages(path: Path) -> bytes:
+    """``path`` up to the end of its last whole message, without that which ends the file; empty where there is none."""
+    content, end = path.read_bytes(), FILE_HEADER
+    while end + MESSAGE.size <= len(content):
+        kind, length = MESSAGE.unpack_from(content, end)
+        if kind == END_OF_FILE or end + MESSAGE.size + length > len(content):
+            break
+        end += MESSAGE.size + length
+    return content[:end] if end > FILE_HEADER else b""
 
 
 def _times(batch: pa.RecordBatch, static: bool) -> Array | None:
@@ -162,10 +199,19 @@ def _component(entity: str, columns: Mapping[str, _Rows]) -> Component:
     events += [] if cleared is None else [(float(time), NOBODY) for time in cleared.times]
     events.sort(key=lambda event: event[0])
     return Component(
-        _shape(entity.removeprefix(BODIES), columns),
+        _shape(_plain(entity.removeprefix(BODIES)), columns),
         np.array([time for time, _ in events]),
         tuple(instances for _, instances in events),
     )
+
+
+def _plain(part: str) -> str:
+    """A name as it was before it became a part of an entity's path."""
+
+    def letter(found: re.Match[str]) -> str:
+        return chr(int(found[1], 16)) if found[1] else CONTROLS.get(found[2], found[2])
+
+    return ESCAPED.sub(letter, part)
 
 
 def _places(

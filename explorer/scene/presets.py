@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from platformdirs import user_data_path
 from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
 from explorer.scene.source import Difference
+from explorer.scene.text import toml_value
 from solver.assets import asset_path, shipped_assets
 from solver.params import ParameterError
 from solver.scenes.scene import Scene, canonical, parameters
@@ -93,12 +93,12 @@ def save_preset(name: str, folder: Path, changed: Iterable[Difference]) -> Path:
     """
     if not NAME.fullmatch(name):
         raise CommandError(f"preset {name[:60]!r}: up to 40 letters, digits, blanks, - and _ are allowed")
-    rows = [f"{json.dumps(one.path)} = {_toml(one.now)}" for one in changed]
+    rows = [f"{toml_value(one.path)} = {toml_value(one.now)}" for one in changed]
     if not rows:
         raise CommandError("preset: nothing differs from the default, there is nothing to save")
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{name}.toml"
-    heading = f'# Preset; values in SI.\nformat = 1\ntitle = {json.dumps(name)}\nabout = "saved from the page"\n'
+    heading = f'# Preset; values in SI.\nformat = 1\ntitle = {toml_value(name)}\nabout = "saved from the page"\n'
     write_whole(path, "\n".join((heading, "[values]", *rows, "")))
     return path
 
@@ -115,10 +115,6 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 def _matching(pattern: str, paths: Iterable[str]) -> list[str]:
     form = re.compile(re.escape(pattern).replace(r"\*", r"[^.]+"))
     return [path for path in paths if form.fullmatch(path)]
-
-
-def _toml(value: float | str) -> str:
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(float(value))
 
 
 def data_folder() -> Path:

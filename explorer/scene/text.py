@@ -140,8 +140,8 @@ def body_text(
     size = " × ".join(f"{1e3 * extent:.4g}" for extent in true.extents)
     mesh = ""
     if drawn is not None:
-        mesh = f"mesh = {json.dumps(drawn.as_posix())}   # drawn instead of the spheres\n"
-        mesh += f"unit = {json.dumps(solid.unit)}\n"
+        mesh = f"mesh = {toml_value(drawn.as_posix())}   # drawn instead of the spheres\n"
+        mesh += f"unit = {toml_value(solid.unit)}\n"
     rows = ",\n".join(f"    [{_numbers(centre)}]" for centre in centres)
     numbers = {
         "volume_ratio": fit.volume_ratio,
@@ -160,7 +160,7 @@ def body_text(
 format = 1
 
 [[body]]
-name = {json.dumps(name)}
+name = {toml_value(name)}
 density = {density:.{DIGITS}g}   # [kg/m3], at which mass and inertia hold
 mass = {true.mass:.{DIGITS}g}   # [kg]
 inertia = [{_numbers(true.inertia)}]   # principal moments [kg m2]
@@ -178,7 +178,7 @@ def _numbers(values: Iterable[float]) -> str:
 
 def toml_key(name: str) -> str:
     """``name`` as a key, quoted where it has to be."""
-    return name if name.replace("_", "").replace("-", "").isalnum() and name.isascii() else json.dumps(name)
+    return name if name.replace("_", "").replace("-", "").isalnum() and name.isascii() else toml_value(name)
 
 
 def toml_value(entry: Any) -> str:
@@ -188,7 +188,8 @@ def toml_value(entry: Any) -> str:
     if isinstance(entry, list | tuple):
         return "[" + ", ".join(toml_value(item) for item in entry) + "]"
     if isinstance(entry, str):
-        return json.dumps(entry, ensure_ascii=False)
+        # JSON writes a letter beyond U+FFFF as two halves, which TOML refuses, and leaves U+007F as it is.
+        return json.dumps(entry, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(entry, bool):
         return "true" if entry else "false"
     if isinstance(entry, int):

@@ -39,10 +39,16 @@ class LippedPlate(LiftingCylinder):
         return (*super().surfaces(), Revolved(radius, 0.0, radius, self.lip_height, self.wall))
 
     def check(self, widest_body: float) -> None:
-        """Refuse a lip inside the cylinder."""
+        """Refuse a lip inside the cylinder or outside the domain."""
         super().check(widest_body)
         if self.lip_diameter <= self.diameter:
             raise ParameterError(
                 f"rig.lip_diameter: {self.lip_diameter:g} m is no wider than the cylinder; allowed: above rig.diameter "
                 f"({self.diameter:g} m)"
+            )
+        if self.lip_diameter >= 2.0 * self.domain_half_width:
+            raise ParameterError(
+                f"rig.lip_diameter: {self.lip_diameter:g} m stands beyond rig.domain_half_width "
+                f"({self.domain_half_width:g} m), where bodies are taken out; allowed: below "
+                f"{2.0 * self.domain_half_width:g} m"
             )

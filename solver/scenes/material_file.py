@@ -61,6 +61,13 @@ SET_UP = ("rig", "insertion", "numerics", "contact", "effect")
 """Tables that may lie over a material in any file."""
 MESH = "rig.mesh"
 """Path of the parameter that names a file."""
+LEAST_EXTENT, LARGEST_EXTENT = 1e-6, 100.0
+"""Longest outer dimension of a body [m]."""
+LIGHTEST, HEAVIEST = 1e-2, 1e5
+"""Mass of a body by its spheres over the volume of the ball around them [kg/m3]. They may fill a hundredth of it, and
+be a third of the true shape."""
+SMALLEST_MOMENT, LARGEST_MOMENT = 1e-9, 100.0
+"""Moments over mass times the ball's radius squared: of a hair, and of a needle that one sphere stands for."""
 QUANTILE = re.compile(r"p(\d{1,2}(?:\.\d+)?)")
 SPHERES_BY_HAND = ("sphere_centres", "sphere_radii", "mass", "inertia", "density", "mesh", "unit", "fit")
 ELASTIC = ("youngs_modulus", "shear_modulus", "poisson_ratio")
@@ -275,6 +282,8 @@ def with_settings(scene: Scene, values: Mapping[str, Any]) -> Scene:
 
 def _material(name: str, entry: Settings) -> Material:
     where = f"materials.{name}"
+    if not name or "." in name:
+        raise ParameterError(f"materials: {name!r} must be a non-empty name without a dot")
     known = declared(Material, where)
     values: dict[str, float] = {}
     for key, raw in entry.items():
@@ -348,6 +357,10 @@ def _body(entry: Settings, materials: tuple[Material, ...], path: Path) -> Body:
     spheres = str(SPHERES.check(table.spheres))
     shape = _members(table, where, path) if by_spheres else _solid(table, where, path)
     body = Body(table.name, material.name, table.mass_fraction, shape, material.density, spheres)
+    if not LEAST_EXTENT <= (longest := max(body.extents)) <= LARGEST_EXTENT:
+        raise ParameterError(f"{where}: {longest:g} m long; allowed: {LEAST_EXTENT:g} … {LARGEST_EXTENT:g} m")
+    if isinstance(shape, Members) and shape.fit is None:
+        _check_members(body, shape, where)
     return replace(body, sizes=_sizes(table, body))
 
 
@@ -393,6 +406,10 @@ def _members(table: BodyTable, where: str, path: Path) -> Members:
         raise ParameterError(
             f"{where}.sphere_radii: {len(table.sphere_radii)} radii for {len(table.sphere_centres)} sphere_centres"
         )
+    if min(table.sphere_radii) < LEAST_EXTENT / 2.0:
+        raise ParameterError(
+            f"{where}.sphere_radii: {min(table.sphere_radii):g} m; allowed: from {LEAST_EXTENT / 2.0:g} m"
+        )
     if table.mass is None or table.inertia is None:
         raise ParameterError(f"{where}.{'mass' if table.mass is None else 'inertia'}: missing")
     drawn = None
@@ -404,6 +421,23 @@ def _members(table: BodyTable, where: str, path: Path) -> Members:
         numbers = table.fit.model_dump()
         fit = ClumpFit(n_spheres=len(table.sphere_radii), smallest_radius=min(table.sphere_radii), **numbers)
     return Members(table.sphere_centres, table.sphere_radii, table.mass, table.inertia, table.density, drawn, fit)
+
+
+def _check_members(body: Body, shape: Members, where: str) -> None:
+    """Refuse mass and moments that no body has which these spheres stand for: they are in another unit."""
+    radius = math.hypot(*body.extents) / 2.0
+    volume, moment = 4.0 / 3.0 * math.pi * radius**3, body.mass * radius**2
+    if not LIGHTEST * volume <= body.mass <= HEAVIEST * volume:
+        raise ParameterError(
+            f"{where}.mass: {body.mass:g} kg, of spheres in a ball of {2.0 * radius:.3g} m; "
+            f"allowed: {LIGHTEST * volume:.3g} … {HEAVIEST * volume:.3g} kg"
+        )
+    inertia = body.clump.inertia
+    if not SMALLEST_MOMENT * moment <= inertia.min() <= inertia.max() <= LARGEST_MOMENT * moment:
+        raise ParameterError(
+            f"{where}.inertia: {list(shape.inertia)} kg m2, of {body.mass:g} kg in a ball of {2.0 * radius:.3g} m; "
+            f"allowed: {SMALLEST_MOMENT * moment:.3g} … {LARGEST_MOMENT * moment:.3g} kg m2"
+        )
 
 
 def measured_spread(table: SizeTable, where: str) -> float:

@@ -261,3 +261,10 @@ def test_bad_options_are_one_line(options, words):
     assert result.exit_code == 2
     assert words in result.output
     assert len(result.output.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize(("option", "value", "case"), [("--spheres", "1000", "pour"), ("--duration", "1", "bed")])
+def test_an_option_of_a_case_that_is_left_out_is_refused(option, value, case):
+    result = CliRunner().invoke(app, ["bench", "--only", case, option, value])
+    assert result.exit_code == 2
+    assert result.stderr.splitlines()[-1].startswith(f"error: {option}: belongs to the case")

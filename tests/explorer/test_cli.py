@@ -202,6 +202,11 @@ def test_serve_refuses_two_materials():
     assert "name one of the two" in line
 
 
+@pytest.mark.parametrize("option", [("--seed", 1), ("--store", "runs.sqlite"), ("--set", "rig.mass=1g")])
+def test_a_recording_is_played_without_what_belongs_to_a_pour(option):
+    assert "leave the others out" in refused(explorer("serve", "--replay", "pour.rrd", *option))
+
+
 def test_a_material_of_one_s_own_is_served_with_a_study_of_its_own_factors(monkeypatch, tmp_path):
     from doe.studies.study import load_study
 

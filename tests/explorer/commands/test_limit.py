@@ -10,7 +10,9 @@ from doe.diagnose.result import Level
 from doe.measurement.features import feature_set
 from doe.store import READINGS
 from doe.validation.laboratory import TREFOILS, read_laboratory
+from doe.validation.limit import DataKind, LimitStudy, Reached, Strength
 from doe.validation.reference import Reference, ReferencePours, save
+from explorer.diagnosis.limit import limit_text
 from solver import PHYSICS
 from tests.explorer.command_line import explorer
 
@@ -69,3 +71,10 @@ def test_a_reference_of_another_physics_is_refused(model, tmp_path):
     assert result.exit_code == 2
     assert f"{path}: physics {PHYSICS - 1} is not that of today" in " ".join(result.output.split())
     assert not (tmp_path / "limit.json").exists()
+
+
+def test_data_in_which_no_effect_is_seen_are_named_instead_of_a_limit():
+    strength = Strength(0.1, 0.2)
+    reached = Reached(DataKind("tilt", "tilt", True), (0.3,), strength, None, {"scalars": strength})
+    text = limit_text(LimitStudy({"base": 240}, (reached,), (), ()), ())
+    assert "scalars: no effect is told from zero, so that there is no limit" in text

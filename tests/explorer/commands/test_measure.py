@@ -197,3 +197,12 @@ def test_no_checkerboard_in_one_line(pile, blank, tmp_path):
     line = refused(explorer("measure", pile, "--checkerboard", board))
     assert "checkerboard board.png: " in line
     assert "whole pictures of one camera" in line
+
+
+def test_a_picture_that_stands_twice_is_refused_under_whatever_name(pile, tmp_path):
+    """Two readings of one pile would count as n = 2."""
+    copy = tmp_path / "copy.png"
+    copy.write_bytes(pile.read_bytes())
+    for twin in (pile, copy):
+        line = refused(explorer("measure", pile, twin))
+        assert line == f"{twin}: is the same picture as {pile}; name each pile once"

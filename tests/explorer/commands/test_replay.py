@@ -80,6 +80,9 @@ def test_replay_refuses_what_is_no_recording(recording, tmp_path):
     assert "is a folder" in refused(explorer("replay", tmp_path))
     assert "--static" in refused(explorer("replay", recording, "--native", "--static", tmp_path / "page"))
     assert "not empty" in refused(explorer("replay", recording, "--static", tmp_path))
+    for option in (["--port", 9], ["--no-browser"]):
+        for way in (["--native"], ["--static", tmp_path / "page"]):
+            assert "belong to the page" in refused(explorer("replay", recording, *way, *option))
     assert [path.name for path in tmp_path.iterdir()] == ["text.rrd"]
 
 

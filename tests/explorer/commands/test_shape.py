@@ -159,3 +159,12 @@ def test_shape_refuses(arguments, words, tmp_path, monkeypatch):
     line = refused(explorer("shape", *arguments))
     assert all(word in line for word in words), line
     assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_body_may_have_a_name_of_any_letters(tmp_path):
+    trimesh.creation.box((12.0, 8.0, 6.0)).export(tmp_path / "😀.stl")
+    out = tmp_path / "body.toml"
+    result = explorer("shape", tmp_path / "😀.stl", "--spheres", 1, "--most", 1, "--out", out)
+    assert result.exit_code == 0, result.output
+    (body,) = tomllib.loads(out.read_text(encoding="utf-8"))["body"]
+    assert (body["name"], body["mesh"]) == ("😀", "😀.stl")

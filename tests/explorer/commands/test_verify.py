@@ -74,6 +74,7 @@ def test_a_missed_limit_is_exit_code_one():
     [
         (["--only", "T9"], ["--only", "T9", "T1, T2", "slope"]),
         (["--json", "no/such/folder/x.json"], ["--json", "no folder"]),
+        (["--peer-limit", "5"], ["--peer-limit: belongs to --peers"]),
     ],
 )
 def test_refused(arguments, words, tmp_path, monkeypatch):

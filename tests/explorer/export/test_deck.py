@@ -282,3 +282,8 @@ def test_the_page_names_programs_of_plug_ins_without_loading_them(monkeypatch):
         monkeypatch.setattr(f"{module}.plugged_in", lambda kind: {"tally": entry} if kind == "export" else {})
     assert names() == ("liggghts", "yade", "paraview", "edem", "tally")
     assert programs_text().endswith("edem: tables of the material. tally: of an unknown package.")
+
+
+def test_a_title_of_several_lines_stays_a_comment(deck, tmp_path):
+    write_liggghts(tmp_path, dataclasses.replace(deck, title="two\nrun 7"))
+    assert (tmp_path / "in.liggghts").read_text().startswith("# two run 7, seed 5: ")

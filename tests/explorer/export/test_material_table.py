@@ -106,6 +106,12 @@ def test_every_is_about_moments_only(tmp_path):
     assert line == "--every: belongs to --to paraview, not to edem"
 
 
+@pytest.mark.parametrize("option", [("--time", 2), ("--seed", 1)])
+def test_what_belongs_to_a_pour_is_refused_where_the_material_alone_is_taken(option, tmp_path):
+    line = refused(explorer("export", "funnel", tmp_path / "new", "--to", "edem", *option))
+    assert line == "--time, --seed: of a pour, and --to edem takes the material alone"
+
+
 @pytest.fixture(scope="module")
 def calibrations(tmp_path_factory):
     """Folders with the result.json of a study that found something, and of one that did not."""

@@ -10,9 +10,11 @@ from explorer.export import EXPORTS
 from explorer.export.deck import deck_of
 from explorer.export.readme import _differences
 from explorer.scene.file import load_scene
+from solver import with_values
 from solver.effects import EFFECTS
 from solver.scenes.contact_model import ContactModel
 from solver.scenes.sizes import SizeDistribution
+from tests.explorer.command_line import explorer, refused
 from tests.solver.observables.made_up import cone, record_of
 
 
@@ -89,3 +91,22 @@ def test_the_readme_of_a_deck_says_which_tangential_law_was_used_here(contact, l
     text = _differences("liggghts", contact)
     assert law in text
     assert dashpot in text
+
+
+def test_a_restitution_that_liggghts_cannot_have_is_refused_before_the_pour():
+    scene = with_values(load_scene("funnel"), {"pair.seed.seed.restitution": 0.1})
+    EXPORTS["yade"].check(scene)
+    with pytest.raises(CommandError, match=r"^restitution 0\.1: LIGGGHTS needs more than 0\.05"):
+        EXPORTS["liggghts"].check(scene)
+
+
+@pytest.mark.parametrize("time", ["0.05", "inf", "nan"])
+def test_a_time_that_no_pour_has_is_refused_by_its_own_name(time, tmp_path):
+    line = refused(explorer("export", "funnel", tmp_path / "new", "--to", "yade", "--time", time))
+    assert "--time" in line
+    assert "--set" not in line
+
+
+def test_a_time_that_the_rig_cannot_have_names_the_option(tmp_path):
+    line = refused(explorer("export", "rotating_drum", tmp_path / "new", "--to", "paraview", "--time", 1))
+    assert line.startswith("--time 1: numerics.max_time: 1 s end before the rotating_drum has run")

@@ -283,3 +283,25 @@ def test_one_input_at_a_time_and_for_a_material(tmp_path):
     assert "No such file" in refused(explorer("new", "material", "mine", "--from-yade", path, "--out", tmp_path))
     assert "--from-liggghts" in refused(explorer("new", "material", "mine", "--from-liggghts", path, "--like", "maize"))
     assert "belong to `new material`" in refused(explorer("new", "study", "mine", "--from-edem", path))
+
+
+def test_tables_of_names_with_blanks_come_back(tmp_path):
+    """Pairs and moduli are found by them; without, all of it would be assumed."""
+    folder = tmp_path / "edem"
+    folder.mkdir()
+    scene = load_scene("glass_beads")
+    bead, (body,) = scene.material("bead"), scene.bodies
+    declared = dataclasses.replace(
+        scene,
+        materials=tuple(dataclasses.replace(one, name="my bead") if one is bead else one for one in scene.materials),
+        bodies=(dataclasses.replace(body, name="round one", material="my bead"),),
+        pairs=tuple(
+            dataclasses.replace(p, a=p.a.replace("bead", "my bead"), b=p.b.replace("bead", "my bead"))
+            for p in scene.pairs
+        ),
+    )
+    write_material_table(folder, declared)
+    again, _ = read_back("edem", folder, tmp_path)
+    assert set(again.assumed) == {"body.round one.shape"}
+    assert again.material("my_bead").shear_modulus == pytest.approx(bead.shear_modulus, rel=1e-6)
+    assert again.contact_pair(again.bodies[0], again.bodies[0]).restitution == 0.97

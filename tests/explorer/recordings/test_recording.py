@@ -1,5 +1,7 @@
 """A recording read back is what was logged: shapes, poses, surfaces, curves, events, texts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import rerun as rr
@@ -11,7 +13,7 @@ from explorer.scene.file import load_scene, with_settings
 from explorer.scene.meshes import body_triangles, rig_poses
 from explorer.scene.text import material_toml
 from explorer.viewer.palette import BODY_COLOURS
-from solver import with_values
+from solver import load_material, with_values
 from solver.observables import Value
 from tests.explorer.recordings.test_pour_log import QUARTER_TURN, poses
 
@@ -148,3 +150,28 @@ def test_a_recording_of_another_program_is_refused_in_one_line(tmp_path):
     stream.disconnect()
     with pytest.raises(CommandError, match=r"^\S*other\.rrd: cannot be read as a recording: .+$"):
         read_recording(tmp_path / "other.rrd")
+
+
+@pytest.mark.parametrize("name", ["my seed", "a+b", "a/b", "/a//b/", "körner", "😀", "10 %", "a\\b", "two\nlines"])
+def test_a_body_of_any_name_is_played_under_it(name, tmp_path):
+    scene = load_material("glass_beads")
+    scene = replace(scene, bodies=(replace(scene.bodies[0], name=name),))
+    with PourLog(tmp_path / "odd.rrd", scene, seed=1) as log:
+        log.frame(0.0, poses(0, 0), {})
+    found = read_recording(tmp_path / "odd.rrd")
+    assert [component.shape.name for component in found.components] == [name]
+    assert found.scene == scene
+
+
+def test_a_file_that_ends_within_a_message_is_read_up_to_it(scene, tmp_path):
+    path, cut = tmp_path / "whole.rrd", tmp_path / "cut.rrd"
+    with PourLog(path, scene, seed=1) as log:
+        for k in range(20):
+            log.frame(0.02 * k, poses(0, 0), {})
+            log.flush()
+    content, seen = path.read_bytes(), []
+    for share in (0.6, 0.7, 0.8, 1.0 - 10 / len(content)):
+        cut.write_bytes(content[: round(share * len(content))])
+        seen.append(len(read_recording(cut).times))
+    assert seen == sorted(seen)
+    assert 1 <= seen[0] <= seen[-1] == 20

@@ -1,5 +1,7 @@
 """Presets: the shipped ones fit every material, own ones come back as saved, bad files are refused in one line."""
 
+from dataclasses import replace
+
 import pytest
 
 from explorer.errors import CommandError
@@ -40,6 +42,16 @@ def test_what_is_saved_comes_back(tmp_path):
     assert preset_names(tmp_path / "presets")[-1] == f"My try 1{OWN_MARK}"
     assert preset_path(f"My try 1{OWN_MARK}", tmp_path / "presets") == path
     assert with_values(SCENE, preset_values(read_preset(path), SCENE)) == changed
+
+
+def test_a_body_of_any_name_is_saved(tmp_path):
+    beads = SCENES["beads"]
+    (body,) = beads.bodies
+    pairs = tuple(replace(p, **{end: "😀" for end in "ab" if getattr(p, end) == body.name}) for p in beads.pairs)
+    scene = replace(beads, bodies=(replace(body, name="😀"),), pairs=pairs)
+    changed = with_values(scene, {"body.😀.size_distribution": "uniform", "body.😀.size_spread": 0.1})
+    path = save_preset("odd", tmp_path, differences(scene, changed))
+    assert with_values(scene, preset_values(read_preset(path), scene)) == changed
 
 
 @pytest.mark.parametrize("name", ["", "../evil", "a/b", ".hidden", "x" * 41, "<b>", "a\nb"])

@@ -122,3 +122,19 @@ def test_declared_spheres_keep_their_mesh_density_and_fit(tmp_path):
     )
     scene = replace(scene, bodies=(replace(body, shape=shape),))
     assert read_back(material_toml(scene), tmp_path) == scene
+
+
+@pytest.mark.parametrize("name", ["my bead", 'a"b', "a/b", "two\nlines", "𝛼", "😀", "\x7f"])
+def test_names_of_any_letters_come_back(name, tmp_path):
+    """Also those that JSON writes as two halves, which TOML has not."""
+    scene = load_material("glass_beads")
+    (body,), bead = scene.bodies, scene.material("bead")
+    pairs = tuple(replace(p, a=p.a.replace("bead", name), b=p.b.replace("bead", name)) for p in scene.pairs)
+    scene = replace(
+        scene,
+        title=name,
+        materials=tuple(replace(one, name=name) if one is bead else one for one in scene.materials),
+        bodies=(replace(body, name=name, material=name),),
+        pairs=pairs,
+    )
+    assert read_back(material_toml(scene), tmp_path) == scene

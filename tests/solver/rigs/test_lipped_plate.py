@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from solver.params import ParameterError
 from solver.pours.run import Job, run_pours
 from solver.rigs.lipped_plate import LippedPlate
 from solver.scenes.material_file import load_material, with_settings
@@ -35,3 +36,9 @@ def test_a_lip_keeps_what_rolls_away_from_a_bare_plate():
         beyond["bare" if index else "lipped"] = np.mean(distance > 0.5 * BEADS.rig.lip_diameter)
     assert beyond["lipped"] < 0.05
     assert beyond["bare"] > 0.3
+
+
+def test_a_lip_beyond_the_domain_is_refused():
+    """Bodies would be taken out before they come to it."""
+    with pytest.raises(ParameterError, match=r"^rig\.lip_diameter: 0\.2 m stands beyond rig\.domain_half_width"):
+        with_settings(BEADS, {"rig.lip_diameter": 0.2, "rig.domain_half_width": 0.1})

@@ -187,3 +187,11 @@ def test_mass_is_proportional_to_density(scene):
     assert after.mass == pytest.approx(2 * before.mass, rel=1e-12)
     assert after.clump.mass == pytest.approx(2 * before.clump.mass, rel=1e-12)
     assert after.clump.inertia == pytest.approx(2 * before.clump.inertia, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["", "p.p"])
+def test_a_material_s_name_is_a_part_of_a_path(name):
+    table = copy.deepcopy(TABLE)
+    table["materials"][name] = table["materials"]["seed"]
+    with pytest.raises(ParameterError, match=rf"^materials: '{name}' must be a non-empty name without a dot$"):
+        scene_from(table, PATH)

@@ -44,6 +44,32 @@ def body_file(tmp_path, text="", name="dumbbell.toml", **others):
     return path
 
 
+@pytest.mark.parametrize(
+    ("others", "key"),
+    [
+        ({"mass": 1e-300}, "mass"),
+        ({"mass": 1e308}, "mass"),
+        ({"mass": 0.2}, "mass"),
+        ({"density": 1e290}, "mass"),
+        ({"inertia": [0.7, 1.5, 1.5]}, "inertia"),
+        ({"inertia": [1e-300, 1e-300, 1e-300]}, "inertia"),
+        ({"sphere_radii": [1e-300, 3e-3]}, "sphere_radii"),
+        ({"sphere_centres": [[0.0, 0.0, 1e308], [0.0, 0.0, 0.0]]}, ""),
+    ],
+)
+def test_numbers_of_another_unit_that_no_body_of_these_spheres_has_are_refused(others, key, tmp_path):
+    """Grams for kilograms, g mm² for kg m²; and what would leave a time step of zero."""
+    with pytest.raises(ParameterError, match=rf"^body\.plate\.?{key}: .*allowed: ") as refused:
+        scene_with(tmp_path, **declared(**others))
+    assert len(str(refused.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize("diameter", [1e-300, 1e-7, 1e300])
+def test_a_solid_of_no_body_s_size_is_refused(diameter, tmp_path):
+    with pytest.raises(ParameterError, match=r"^body\.plate: .* m long; allowed: 1e-06 … 100 m$"):
+        scene_with(tmp_path, shape={"sphere": diameter})
+
+
 def test_sizes_stand_in_the_table(tmp_path):
     scene = scene_with(tmp_path, **declared(), size_distribution="log_normal", size_spread="15 %")
     assert scene.bodies[1].sizes == SizeDistribution("log_normal", 0.15)
