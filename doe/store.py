@@ -42,6 +42,11 @@ CREATE TABLE IF NOT EXISTS pours (
     steps INTEGER NOT NULL, wall_s REAL NOT NULL, raw BLOB NOT NULL
 )
 """
+KEPT_AS = {"parameters": dict, "observables": dict, "raw": bytes}
+"""What columns hold once they are read; SQLite itself takes anything in any column."""
+DAMAGE = (sqlite3.Error, OSError, UnicodeDecodeError)
+"""What SQLite and the file system raise for a file that is damaged or out of reach; the last where the text of a
+complaint is damaged itself."""
 OWN = {"store", "pours"}
 """Names of its tables."""
 BEFORE_RAW_POURS = "runs"
@@ -89,6 +94,11 @@ class StoredRun:
         return Outcome(self.outcome).valid
 
 
+def one_line(error: Exception) -> str:
+    """What ``error`` says, of which a damaged file may be a part, in one line that is not too long to read."""
+    return " ".join(str(error).split())[:200]
+
+
 def default_store() -> Path:
     """``$REPOSE_STORE``, or the file of the present physics in the user's data directory."""
     named = os.environ.get("REPOSE_STORE")
@@ -99,6 +109,16 @@ def observables_in_rig(run: StoredRun) -> tuple[str, ...]:
     """Names of the observables of the rig of ``run``; none for a rig that is not known."""
     rig = RIGS.get(str(run.parameters.get(RIG)))
     return observables_in(rig()) if rig is not None else ()
+
+
+def address(path: Path, reading: bool) -> str:
+    """The store file ``path`` as the URI that SQLite opens.
+
+    A file in a folder where nothing can be made is opened ``reading`` as one that nobody changes: SQLite has no place
+    there for what processes share.
+    """
+    unchanging = reading and not os.access(path.parent, os.W_OK) and not Path(f"{path}-wal").exists()
+    return path.absolute().as_uri() + ("?immutable=1" if unchanging else "")
 
 
 def read_off(raw: bytes, reader: Reader) -> Readings:
@@ -123,14 +143,16 @@ class Store:
     """Pours in a SQLite file; several processes may read and write at once.
 
     ``pouring`` says whether pours will be added. Raises StoreError for a file that is no store, and, if pours will be
-    added, for one of another version of the physics.
+    added, for one that cannot be written and for one of another version of the physics.
     """
 
     def __init__(self, path: Path, pouring: bool = True) -> None:
         self.path = path
         with self._told():
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._db = sqlite3.connect(path, timeout=60.0)
+            if pouring and not all(os.access(one, os.W_OK) for one in (path.parent, path) if one.exists()):
+                raise StoreError(f"{path}: cannot be written; name another file for new pours")
+            self._db = sqlite3.connect(address(path, reading=not pouring), timeout=60.0, uri=True)
             try:
                 self._table = self._opened()
             except BaseException:
@@ -148,9 +170,9 @@ class Store:
         """Turn what SQLite and the file system complain of into one line."""
         try:
             yield
-        except (sqlite3.Error, OSError) as error:
+        except DAMAGE as error:
             raise StoreError(
-                f"{self.path}: cannot be used as a store of runs ({error}); --store FILE names another"
+                f"{self.path}: cannot be used as a store of runs ({one_line(error)}); --store FILE names another"
             ) from None
 
     def _opened(self) -> str:
@@ -176,7 +198,10 @@ class Store:
                 self._db.execute("INSERT INTO store SELECT ? WHERE NOT EXISTS (SELECT * FROM store)", (PHYSICS,))
                 self._db.execute(SCHEMA)
                 self._db.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
-        (self.physics,) = self._db.execute("SELECT physics FROM store").fetchone()
+        said = self._db.execute("SELECT physics FROM store").fetchone()
+        if said is None or not isinstance(said[0], int):
+            raise StoreError(f"{self.path}: a damaged store: it does not say of which physics it is")
+        self.physics = said[0]
         return "pours"
 
     @property
@@ -236,8 +261,8 @@ class Store:
         """Return ``run`` with its outcome and the readings ``names`` of the present version.
 
         Those that are kept, if they are of that version and all of ``names`` are there. Otherwise ``reader`` reads the
-        raw pour again, and what it finds is kept, but for a store of an older physics. A run without a raw pour is
-        returned as it is. Raises StoreError for a raw pour that cannot be read.
+        raw pour again, and what it finds is kept, but for a store of an older physics and one that takes nothing. A run
+        without a raw pour is returned as it is. Raises StoreError for a raw pour that cannot be read.
         """
         present = run.readings == READINGS
         if not run.raw or (present and run.observables.keys() >= set(names)):
@@ -253,7 +278,9 @@ class Store:
             observables=_numbers(reader(record)) | kept,
         )
         if self.physics == PHYSICS:
-            self.add(run)
+            # On a full disk, or where nothing may be written, it is read again the next time.
+            with contextlib.suppress(StoreError):
+                self.add(run)
         return run
 
     def _record(self, run: StoredRun) -> Record:
@@ -267,9 +294,11 @@ class Store:
         try:
             values["parameters"] = json.loads(values["parameters"])
             values["observables"] = json.loads(values["observables"])
-        except (TypeError, ValueError):
+            if not all(isinstance(values[name], kind) for name, kind in KEPT_AS.items()):
+                raise TypeError
+        except (TypeError, ValueError, RecursionError):
             raise StoreError(
-                f"{self.path}: run {str(values['key'])[:12]}: its parameters or readings cannot be read"
+                f"{self.path}: run {str(values['key'])[:12]}: its parameters, readings or raw pour cannot be read"
             ) from None
         return StoredRun(**values)
 

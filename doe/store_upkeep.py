@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from doe.store import Store, StoredRun, StoreError
+from doe.store import DAMAGE, Store, StoredRun, StoreError, address, one_line
 from solver import RawPourError, packed, unpacked
 
 
@@ -66,7 +66,7 @@ def export(path: Path, to: Path, study: str) -> int:
             # Of the physics that it was poured by, whatever that of this program is.
             db.execute("UPDATE store SET physics = (SELECT physics FROM other.store)")
             return db.execute("INSERT INTO pours SELECT * FROM other.pours WHERE study = ?", (study,)).rowcount
-    except StoreError:
+    except BaseException:  # by Ctrl-C as well
         to.unlink(missing_ok=True)
         raise
 
@@ -155,15 +155,15 @@ def _opened(path: Path, readings_do: bool = False) -> Iterator[tuple[Store, sqli
         if not store.physics and not readings_do:
             raise StoreError(f"{path}: holds readings without raw pours; `explorer runs --csv --store {path}` lists it")
         try:
-            with contextlib.closing(sqlite3.connect(path, timeout=60.0)) as db:
+            with contextlib.closing(sqlite3.connect(address(path, reading=True), timeout=60.0, uri=True)) as db:
                 yield store, db
-        except (sqlite3.Error, RawPourError) as error:
-            raise StoreError(f"{path}: cannot be used as a store of runs ({error})") from None
+        except (*DAMAGE, RawPourError) as error:
+            raise StoreError(f"{path}: cannot be used as a store of runs ({one_line(error)})") from None
 
 
 @contextlib.contextmanager
 def _attached(db: sqlite3.Connection, other: Path) -> Iterator[None]:
-    db.execute("ATTACH DATABASE ? AS other", (str(other),))
+    db.execute("ATTACH DATABASE ? AS other", (address(other, reading=True),))
     try:
         yield
     finally:

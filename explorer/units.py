@@ -21,6 +21,8 @@ MISSING = "–"
 """What stands for a number that could not be computed."""
 OWN = "own:"
 """Beginning of the path of a quantity that no scene declares: "own:NAME [UNIT]", its values in that unit already."""
+MANY = 1e6
+"""From here on a number is written with an exponent."""
 UNIT_ENDINGS = ("_deg", "_kg_m3", "_m", "_s", "_kg")
 """What ends the name of an observable, and is no word of its label."""
 
@@ -153,11 +155,15 @@ def observed(name: str, value: float | None) -> str:
 
 
 def observed_number(name: str, value: float | None) -> str:
-    """The same without its unit: two places, which suit ° and mm; what they would cut away has three digits."""
+    """The same without its unit: two places, which suit ° and mm; what they would cut away has three digits, what takes
+    an exponent four.
+    """
     unit = unit_of_observable(name)
     read = None if value is None else unit.of(value)
     # Nobody knows the size of a quantity of someone's own; plain numbers are shares and ratios.
     least = 1.0 if name.startswith(OWN) or not unit.symbol else 0.01
+    if read and abs(read) >= MANY:
+        return number(read, 4)
     return number(read) if read and abs(read) < least and unit.symbol != "°" else fixed(read)
 
 
@@ -207,7 +213,7 @@ def number(value: float | None, digits: int = 3) -> str:
     if value is None or not math.isfinite(value):
         return MISSING
     rounded = float(f"{value:.{digits}g}")
-    if rounded == 0 or 1e-4 <= abs(rounded) < 1e6:
+    if rounded == 0 or 1e-4 <= abs(rounded) < MANY:
         decimals = 0 if rounded == 0 else max(0, digits - 1 - math.floor(math.log10(abs(rounded))))
         text = f"{rounded:.{decimals}f}"
         text = text.rstrip("0").rstrip(".") if "." in text else text
@@ -257,6 +263,12 @@ def code(text: str) -> str:
 def term_text(term: str) -> str:
     """A term of a model, or a source of variation, as it is read: "A*B^2" → "A × B²"."""
     return term.replace("*", " × ").replace("^2", "²")
+
+
+def counted(n: int, what: str) -> str:
+    """ "1 factor", "2 factors"; of "degree of freedom" the first word changes."""
+    first, of, rest = what.partition(" of ")
+    return f"{n} {first}{'' if n == 1 else 's'}{of}{rest}"
 
 
 def enumeration(items: Sequence[str]) -> str:

@@ -25,7 +25,7 @@ from scipy.optimize import brentq, minimize
 from scipy.stats import qmc
 
 from doe.analysis.optimum import ResponseTarget
-from doe.analysis.replicates import require_matrix
+from doe.analysis.replicates import valid_runs
 from doe.analysis.steepest_ascent import Region
 from doe.errors import StatisticsError
 from doe.record import Record
@@ -122,9 +122,8 @@ def fit_process(coded: FloatArray, responses: FloatArray, region: Region) -> Gau
 
     Raises StatisticsError for too few or too many runs, or a response that never changes.
     """
-    values = require_matrix("responses", responses, rows=len(coded))
-    row, replicate = np.nonzero(~np.isnan(values))
-    points, observed = coded[row], values[row, replicate]
+    _, row, observed = valid_runs(responses, len(coded))
+    points = coded[row]
     n, k = points.shape
     if not FEWEST_RUNS <= n <= MOST_RUNS:
         raise StatisticsError(
@@ -157,7 +156,7 @@ def fit_process(coded: FloatArray, responses: FloatArray, region: Region) -> Gau
         mean=float(observed.mean()) + scale * float(inverse.sum(axis=0) @ y / inverse.sum()),
         points=points,
         observed=observed,
-        row_of_run=row.astype(np.int64),
+        row_of_run=row,
         left_out=left_out,
         left_out_sd=signal / np.sqrt(np.diag(projected)),
         press=press,

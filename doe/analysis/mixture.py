@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from doe.analysis.replicates import require_matrix
+from doe.analysis.replicates import valid_runs
 from doe.analysis.surface import least_squares
 from doe.analysis.surface_anova import FULL, AnovaRow, total_sum_of_squares
 from doe.designs.mixture import simplex_lattice
@@ -113,9 +113,7 @@ def fit_mixture(
     lows: least amount of each part; highs: the most of it in a blend that is looked for.
     Raises StatisticsError where the runs do not bear it.
     """
-    values = require_matrix("responses", responses, rows=len(amounts))
-    row, replicate = np.nonzero(~np.isnan(values))
-    observed = values[row, replicate]
+    _, row, observed = valid_runs(responses, len(amounts))
     room = float(amounts.sum(axis=1).mean() - lows.sum())
     if room <= 0:
         raise StatisticsError(

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from doe.analysis.replicates import require_matrix
+from doe.analysis.replicates import valid_runs
 from doe.analysis.steepest_ascent import Region
 from doe.analysis.surface import (
     Blocks,
@@ -204,8 +204,7 @@ def bearable(
     blocks: Blocks | None = None,
 ) -> bool:
     """Return whether the valid runs separate `terms`, and the blocks, and leave an error."""
-    values = require_matrix("responses", responses, rows=len(coded))
-    row, _ = np.nonzero(~np.isnan(values))
+    values, row, _ = valid_runs(responses, len(coded))
     model = second_order_terms(coded[row])[:, included_terms(names, terms)]
     if blocks is not None:
         block_names, block = used_blocks(blocks, values)

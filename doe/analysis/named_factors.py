@@ -29,7 +29,7 @@ from scipy import stats
 from doe.analysis.level_set import nearest_points
 from doe.analysis.models import ORDERS, Order, ReducedModel, Reduction, eliminate, hierarchical
 from doe.analysis.optimum import ResponseTarget, compatible_share, solution_range
-from doe.analysis.replicates import require_matrix
+from doe.analysis.replicates import valid_runs
 from doe.analysis.steepest_ascent import Region
 from doe.analysis.surface import Blocks, Surface, block_columns, least_squares, natural_coefficients, term_names
 from doe.analysis.surface import used_blocks as blocks_of_runs
@@ -205,11 +205,10 @@ def fit_named(
     the highest order leaves 3 degrees of freedom for the error, if any does.
     Raises StatisticsError where the runs do not bear the model.
     """
-    values = require_matrix("responses", responses, rows=len(coded))
-    row, replicate = np.nonzero(~np.isnan(values))
+    values, row, observed = valid_runs(responses, len(coded))
     none = ((), np.zeros(len(row), dtype=np.int64))
     block_names, block = none if blocks is None else blocks_of_runs(blocks, values)
-    runs = _Runs(coded[row], values[row, replicate], row, block, block_names, tuple(map(len, levels)))
+    runs = _Runs(coded[row], observed, row, block, block_names, tuple(map(len, levels)))
     chosen = hierarchical(region.names, terms) if terms else _terms(runs, order)
     df = runs.df(chosen)
     if df < 1:
@@ -245,7 +244,7 @@ def fit_named(
         groups=(),
         observed=runs.observed,
         predicted=predicted,
-        row_of_run=row.astype(np.int64),
+        row_of_run=row,
         studentized=studentized,
         outlier_limit=limit,
         outliers=tuple(np.flatnonzero(np.abs(np.nan_to_num(studentized)) > limit).tolist()),

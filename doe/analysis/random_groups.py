@@ -18,7 +18,7 @@ Bull. 2:110), for a contrast c 2 (c'Fc)^2/Var(c'Fc), F = (X'V^-1 X)^-1, the vari
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +28,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from doe.analysis.models import Order, hierarchical
 from doe.analysis.named_factors import LEAST_DF, NameMean, columns_of, mean_contrasts, orders_of, term_of
-from doe.analysis.replicates import require_matrix
+from doe.analysis.replicates import valid_runs
 from doe.analysis.steepest_ascent import Region
 from doe.analysis.surface import Blocks, block_columns, used_blocks
 from doe.errors import StatisticsError
@@ -160,6 +160,33 @@ class _Likelihood:
         return float(brentq(self.score, RATIOS[least - 1], RATIOS[least + 1], xtol=1e-300, rtol=1e-13))
 
 
+@dataclass(frozen=True)
+class _Runs:
+    """The valid runs: coded points (n, k), values, row of the design, group of each; columns of fixed blocks.
+
+    levels: number of names per factor, 0 of a number.
+    """
+
+    points: FloatArray
+    observed: FloatArray
+    row: IntArray
+    names: tuple[str, ...]
+    group: IntArray
+    fixed: FloatArray
+    levels: tuple[int, ...]
+
+    def matrix(self, terms: Sequence[str]) -> FloatArray:
+        """The model matrix: intercept and terms, then blocks."""
+        return np.column_stack([columns_of(self.levels, terms).matrix(self.points), self.fixed])
+
+    def spare(self, terms: Sequence[str]) -> int:
+        """The fewer of the degrees of freedom between groups and within; -1 where terms cannot be told apart."""
+        model = self.matrix(terms)
+        indicator = (self.group[:, None] == np.arange(len(self.names))).astype(np.float64)
+        rank, both = np.linalg.matrix_rank(model), np.linalg.matrix_rank(np.column_stack([model, indicator]))
+        return int(min(both - rank, len(model) - both)) if rank == model.shape[1] else -1
+
+
 def fit_random(
     coded: FloatArray,
     responses: FloatArray,
@@ -175,93 +202,91 @@ def fit_random(
     By default the highest order that leaves 3 degrees of freedom, if any does, between the groups and within them.
     Raises StatisticsError where the runs do not bear the model, or the groups leave no scatter to compare.
     """
-    values = require_matrix("responses", responses, rows=len(coded))
-    row, replicate = np.nonzero(~np.isnan(values))
-    points, observed = coded[row], values[row, replicate]
-    names, group = used_blocks(groups, values)
+    values, row, observed = valid_runs(responses, len(coded))
     fixed = np.zeros((len(row), 0))
     if blocks is not None:
         block_names, block = used_blocks(blocks, values)
         fixed = block_columns(block, len(block_names))
-    sizes = tuple(map(len, levels))
-    indicator = (group[:, None] == np.arange(len(names))).astype(np.float64)
-
-    def spare(kept: Sequence[str]) -> int:
-        """The fewer of the degrees of freedom between groups and within; -1 where terms cannot be told apart."""
-        model = np.column_stack([columns_of(sizes, kept).matrix(points), fixed])
-        rank, both = np.linalg.matrix_rank(model), np.linalg.matrix_rank(np.column_stack([model, indicator]))
-        return int(min(both - rank, len(row) - both)) if rank == model.shape[1] else -1
-
-    orders = orders_of(sizes)
-    if terms:
-        chosen = hierarchical(region.names, terms)
-    elif order is not None:
-        chosen = orders[order]
-    else:
-        able = [one for one in orders.values() if spare(one) >= 1]
-        chosen = [orders["linear"], *able, *(one for one in able if spare(one) >= LEAST_DF)][-1]
-    if spare(chosen) < 1:
-        raise StatisticsError(
-            f"responses: {len(row)} valid runs in {len(names)} groups do not tell {', '.join(chosen)} from one another "
-            "and from the groups with scatter left between the groups and within; allowed: fewer terms, or more groups"
-        )
-    columns = columns_of(sizes, chosen)
-    likelihood = _Likelihood(np.column_stack([columns.matrix(points), fixed]), observed, group)
+    runs = _Runs(coded[row], observed, row, *used_blocks(groups, values), fixed, tuple(map(len, levels)))
+    chosen = _terms(runs, hierarchical(region.names, terms) if terms else None, order)
+    likelihood = _Likelihood(runs.matrix(chosen), observed, runs.group)
     dust = 8 * np.finfo(np.float64).eps * float(np.abs(observed).max())
     if math.sqrt(max(likelihood.solved(0.0)[2], 0.0) / likelihood.df) <= dust:
         raise StatisticsError("responses: the runs show no scatter about the terms; nothing is left to compare")
     ratio = likelihood.best_ratio()
     inverse, coefficients, squares = likelihood.solved(ratio)
     within = squares / likelihood.df
-    between = ratio * within
-    least = likelihood.deviance(within, between)
+    least = likelihood.deviance(within, ratio * within)
     gain = max(0.0, likelihood.profile(0.0) - least)
     coefficients = coefficients.copy()
     coefficients[0] += likelihood.origin
-    size = len(columns.names)
     errors = _Errors(likelihood, ratio, within, inverse)
+    fixed_part = likelihood.model @ coefficients
+    sums = np.bincount(runs.group, weights=observed - fixed_part)
+    effects = ratio / (1 + ratio * likelihood.sizes) * sums
+    columns = columns_of(runs.levels, chosen)
     of_column = [term_of(name) for name in columns.names]
     single = [k for k, name in enumerate(of_column) if of_column.count(name) == 1]
-    fixed_part = likelihood.model @ coefficients
-    sums = np.bincount(group, weights=observed - fixed_part)
-    effects = ratio / (1 + ratio * likelihood.sizes) * sums
-
-    def estimate(at: FloatArray) -> tuple[float, float, float, float]:
-        """Value, standard error, degrees of freedom and p of a contrast of the terms."""
-        contrast = np.append(at, np.zeros(len(coefficients) - size))
-        value, error, df = float(contrast @ coefficients), *errors.of(contrast)
-        return value, error, df, 2 * float(stats.t.sf(abs(value) / error, df))
-
-    means = []
-    for factor, name, mean_at, effect_at in mean_contrasts(levels, chosen, columns, region.names):
-        mean, error, df, _ = estimate(mean_at)
-        half = float(stats.t.ppf(0.975, df)) * error
-        effect, effect_error, _, p = estimate(effect_at)
-        means.append(NameMean(factor, name, mean, mean - half, mean + half, effect, effect_error, p))
+    at = np.eye(len(of_column))
     return RandomFit(
         levels=tuple(levels),
         terms=chosen,
-        groups=names,
-        runs_of_group=np.bincount(group),
+        groups=runs.names,
+        runs_of_group=np.bincount(runs.group),
         effects=effects,
-        components=(
-            Component(
-                "between groups", between, *_interval(likelihood, within, between, 1), between / (between + within)
-            ),
-            Component("within", within, *_interval(likelihood, within, between, 0), within / (between + within)),
-        ),
+        components=_components(likelihood, within, ratio * within),
         p_groups=float(stats.chi2.sf(gain, 1)) / 2 if gain > 0 else 1.0,
         deviance=least,
         tests=tuple(
             errors.test(term, coefficients, [k for k, name in enumerate(of_column) if name == term]) for term in chosen
         ),
-        coefficients=tuple(Estimate(of_column[k], *estimate(np.eye(size)[k])) for k in single),
-        means=tuple(means),
+        coefficients=tuple(Estimate(of_column[k], *errors.estimate(at[k], coefficients)) for k in single),
+        means=_means(mean_contrasts(levels, chosen, columns, region.names), errors, coefficients),
         observed=observed,
         predicted=fixed_part,
-        predicted_in_group=fixed_part + effects[group],
-        row_of_run=row.astype(np.int64),
+        predicted_in_group=fixed_part + effects[runs.group],
+        row_of_run=row,
     )
+
+
+def _terms(runs: _Runs, given: tuple[str, ...] | None, order: Order | None) -> tuple[str, ...]:
+    """The given terms, those of an order, or of the highest that the runs bear; raises StatisticsError for none."""
+    orders = orders_of(runs.levels)
+    if given is not None:
+        chosen = given
+    elif order is not None:
+        chosen = orders[order]
+    else:
+        able = [one for one in orders.values() if runs.spare(one) >= 1]
+        chosen = [orders["linear"], *able, *(one for one in able if runs.spare(one) >= LEAST_DF)][-1]
+    if runs.spare(chosen) < 1:
+        raise StatisticsError(
+            f"responses: {len(runs.row)} valid runs in {len(runs.names)} groups do not tell {', '.join(chosen)} from "
+            "one another and from the groups with scatter left between the groups and within; allowed: fewer terms, or "
+            "more groups"
+        )
+    return chosen
+
+
+def _components(likelihood: _Likelihood, within: float, between: float) -> tuple[Component, Component]:
+    """Both variances with their intervals."""
+    return (
+        Component("between groups", between, *_interval(likelihood, within, between, 1), between / (between + within)),
+        Component("within", within, *_interval(likelihood, within, between, 0), within / (between + within)),
+    )
+
+
+def _means(
+    contrasts: Iterable[tuple[str, str, FloatArray, FloatArray]], errors: _Errors, coefficients: FloatArray
+) -> tuple[NameMean, ...]:
+    """The mean of every name with its interval, and its effect."""
+    found = []
+    for factor, name, mean_at, effect_at in contrasts:
+        mean, error, df, _ = errors.estimate(mean_at, coefficients)
+        half = float(stats.t.ppf(0.975, df)) * error
+        effect, effect_error, _, p = errors.estimate(effect_at, coefficients)
+        found.append(NameMean(factor, name, mean, mean - half, mean + half, effect, effect_error, p))
+    return tuple(found)
 
 
 class _Errors:
@@ -286,6 +311,12 @@ class _Errors:
         variance = float(contrast @ self.covariance @ contrast)
         slope = np.array([contrast @ one @ contrast for one in self.slopes])
         return math.sqrt(variance), 2 * variance**2 / float(slope @ self.variances @ slope)
+
+    def estimate(self, at: FloatArray, coefficients: FloatArray) -> tuple[float, float, float, float]:
+        """Value, standard error, degrees of freedom and p of a contrast of the terms."""
+        contrast = np.append(at, np.zeros(len(coefficients) - len(at)))
+        value, error, df = float(contrast @ coefficients), *self.of(contrast)
+        return value, error, df, 2 * float(stats.t.sf(abs(value) / error, df))
 
     def test(self, source: str, coefficients: FloatArray, own: list[int]) -> RandomTest:
         """F of several coefficients together."""

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from doe.errors import StatisticsError
 
 FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
 
 
 def require_matrix(name: str, values: npt.ArrayLike, rows: int) -> FloatArray:
@@ -27,6 +28,13 @@ def require_matrix(name: str, values: npt.ArrayLike, rows: int) -> FloatArray:
     if np.isnan(matrix).all():
         raise StatisticsError(f"{name} holds no valid run")
     return matrix
+
+
+def valid_runs(responses: npt.ArrayLike, rows: int) -> tuple[FloatArray, IntArray, FloatArray]:
+    """Return the responses as of `require_matrix`, and the row and the value of every valid run, row by row."""
+    values = require_matrix("responses", responses, rows)
+    row, replicate = np.nonzero(~np.isnan(values))
+    return values, row, values[row, replicate]
 
 
 def row_moments(matrix: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

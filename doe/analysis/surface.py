@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from doe.analysis.replicates import require_matrix
+from doe.analysis.replicates import valid_runs
 from doe.analysis.steepest_ascent import Region
 from doe.errors import StatisticsError
 from doe.record import Record
@@ -135,9 +135,8 @@ def fit_surface(
     design = np.asarray(coded, dtype=np.float64)
     if design.ndim != 2 or design.shape[1] != len(region.names):
         raise StatisticsError(f"coded has shape {design.shape}; allowed is (points, {len(region.names)})")
-    values = require_matrix("responses", responses, rows=design.shape[0])
-    row, replicate = np.nonzero(~np.isnan(values))
-    points, observed = design[row], values[row, replicate]
+    values, row, observed = valid_runs(responses, len(design))
+    points = design[row]
     included = included_terms(region.names, terms)
     names, block = ((), np.zeros(observed.size, dtype=np.int64)) if blocks is None else used_blocks(blocks, values)
     model = np.column_stack([second_order_terms(points)[:, included], block_columns(block, len(names))])
@@ -170,7 +169,7 @@ def fit_surface(
         mse=float(found.mse_resid),
         df_residual=df,
         points=points,
-        row_of_run=row.astype(np.int64),
+        row_of_run=row,
         point_of_run=point_of_run.reshape(-1).astype(np.int64),
         observed=observed,
         predicted=predicted,

@@ -32,7 +32,7 @@ from doe.stages.screening import ScreeningResult
 from doe.stages.stage import Chain, Stage, ended
 from doe.studies.profile import Profile
 from doe.studies.study import Factor, Study
-from doe.target import Target
+from doe.target import Target, observed_text
 
 WHOLE = 0.5
 """Half-width of a region that is the whole of a factor's range, as a share of it."""
@@ -86,7 +86,7 @@ class AscentResult(Record):
         """One line of what the ascent found."""
         if self.approach is not None:
             return self.approach.words([walk.observable for walk in self.walks])
-        return f"{', '.join(f'{mean:.1f}' for mean in self.means)}. {self.bracket.statement}"
+        return f"{', '.join(observed_text(self.observable, mean) for mean in self.means)}. {self.bracket.statement}"
 
     @property
     def walks(self) -> tuple[TargetWalk, ...]:

@@ -40,7 +40,7 @@ from doe.run_records import FloatArray, Run, Runner, Setting, responses
 from doe.stages.stage import Bias, Chain, Stage
 from doe.studies.profile import Profile
 from doe.studies.study import CALIBRATED, Study
-from doe.target import experiment_of, is_angle
+from doe.target import experiment_of, is_angle, observed_text
 
 REFERENCE = "reference"
 """Label of the setting that nothing is changed in."""
@@ -92,9 +92,12 @@ class PilotResult(Record):
     def line(self) -> str:
         """One line of what the pilot found."""
         target, noise = next(iter(self.noise.items()))
+        mean, sigma, low, high = (
+            observed_text(target, value) for value in (noise.mean, noise.sigma, noise.low, noise.high)
+        )
         return (
-            f"{target} {noise.mean:.1f} ± {noise.sigma:.1f} over {noise.runs} seeds "
-            f"(σ 95 % {noise.low:.1f} … {noise.high:.1f}); estimator for screening: {self.estimator}"
+            f"{target} {mean} ± {sigma} over {noise.runs} seeds (σ 95 % {low} … {high}); estimator for screening: "
+            f"{self.estimator}"
         )
 
 

@@ -35,7 +35,10 @@ class ScanResult(Record):
     @property
     def line(self) -> str:
         """One line of what the scan found."""
-        pairs = ", ".join(f"{value:g} → {mean:.1f}" for value, mean in zip(self.values, self.means, strict=True))
+        pairs = ", ".join(
+            f"{value:g} → {observed_text(self.observable, mean)}"
+            for value, mean in zip(self.values, self.means, strict=True)
+        )
         seen = observed_text(self.observable, self.smallest_difference)
         return f"{self.path}: {pairs}; smallest difference seen {seen}"
 

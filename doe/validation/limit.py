@@ -172,7 +172,7 @@ class LimitStudy(Record):
     confusable
         All pairs, by kind of data and the most alike first.
     rows
-        Limits.
+        Limits; none of data in which no effect is told from zero.
     """
 
     pours: Mapping[str, int]
@@ -244,7 +244,8 @@ def limit_study(
                 by_data[data] = found.strength
                 confusable += _most_alike(data, kinds, found)
             rng = np.random.default_rng(seed)
-            rows += [LimitRow(data, replicates, limit_of(found, kinds, strength, rng)) for strength in STRENGTHS]
+            limits = [limit_of(found, kinds, strength, rng) for strength in STRENGTHS]
+            rows += [LimitRow(data, replicates, limit) for limit in limits if limit is not None]
     reached = tuple(
         Reached(kind, level.direction.at(level.share), ruler[k], weak[k], {d: by_data[d][k] for d in by_data})
         for k, (kind, level) in enumerate(zip(kinds, levels, strict=True))
@@ -255,16 +256,19 @@ def limit_study(
 
 def limit_of(
     found: Signatures, kinds: Sequence[DataKind], strength: float, rng: np.random.Generator, sets: int = SETS
-) -> Limit:
+) -> Limit | None:
     """The limit for effects that are ``strength`` σ strong on the ruler.
 
-    ``kinds``: what each of ``found.names`` is; only those whose strengths are known to be above zero take part.
+    ``kinds``: what each of ``found.names`` is; only those whose strengths are known to be above zero take part. None
+    where there is none.
     """
     # How much stronger than on the ruler an effect is in these features.
     gain = np.array(
         [s.value / r.value if r.value > 0.0 else 0.0 for s, r in zip(found.strength, found.ruler, strict=True)]
     )
     seen = [k for k, one in enumerate(found.ruler) if one.value > 2.0 * one.error and gain[k] > 0.0]
+    if not seen:
+        return None
     cosines, gain = found.cosines[np.ix_(seen, seen)], gain[seen]
     effects = [kinds[k].effect for k in seen]
     groups = sorted(set(effects))

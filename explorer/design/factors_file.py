@@ -128,7 +128,7 @@ def make_factor(name: str, low: float, high: float, unit: str, reference: float 
     """A checked factor; raises StudyFileError."""
     checked_name(name, f"{where}.name")
     if unit and not UNIT.fullmatch(unit):
-        raise StudyFileError(f"{where}.unit: {unit!r}; allowed: up to 20 characters without | , ; [ ] or quotes")
+        raise StudyFileError(f"{where}.unit: {unit!r}; allowed: up to 20 characters without | , ; < > [ ] or quotes")
     for key, value in (("low", low), ("high", high), ("reference", reference)):
         if value is not None and not math.isfinite(value):
             raise StudyFileError(f"{where}.{key}: {value!r} is not a number")
@@ -148,7 +148,8 @@ def make_names(name: str, levels: tuple[str, ...], where: str) -> DesignFactor:
     for level in levels:
         if not LEVEL.fullmatch(level) or is_number(level):
             raise StudyFileError(
-                f"{where}.levels: {level!r}; allowed: names of up to 40 characters without | , ; or quotes ({name})"
+                f"{where}.levels: {level!r}; allowed: names of up to 40 characters without | , ; < > [ ] or quotes "
+                f"({name})"
             )
     return DesignFactor(name, -1.0, 1.0, "", 0.0, levels)
 
@@ -250,7 +251,9 @@ def _factors_file(table: FactorsTable) -> FactorsFile:
     heads = [RESPONSE.fullmatch(text) for text in table.responses]
     for text, head in zip(table.responses, heads, strict=True):
         if head is not None and head["unit"] and not UNIT.fullmatch(head["unit"]):
-            raise StudyFileError(f"responses: unit of {text!r}; allowed: up to 20 characters without | , ; or quotes")
+            raise StudyFileError(
+                f"responses: unit of {text!r}; allowed: up to 20 characters without | , ; < > or quotes"
+            )
     responses = tuple(
         checked_name(text if head is None else head["name"], "responses")
         for text, head in zip(table.responses, heads, strict=True)

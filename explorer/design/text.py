@@ -32,7 +32,7 @@ from explorer.report.design.sections import factor_table, in_short, settings_tab
 from explorer.report.design.surrogate import errors_table, lengths_table, process_settings
 from explorer.report.sections.surface import anova_table, variance_table
 from explorer.terminal.text_table import text_table
-from explorer.units import number
+from explorer.units import counted, number
 
 
 def check_power(sigma: float | None, effect: float | None) -> None:
@@ -125,7 +125,7 @@ def _power_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: f
     names = f"\n{OF_NAMES}" if any(one.df_term > 1 for one in found) else ""
     return (
         f"what the {planned_order(plan, file)} model will see at p < 0.05, in {unit} "
-        f"({found[0].df} degrees of freedom for the error):\n{table}{names}"
+        f"({counted(found[0].df, 'degree of freedom')} for the error):\n{table}{names}"
     )
 
 
@@ -136,8 +136,8 @@ def _mixture_text(plan: RunPlan) -> str:
     if order is None:
         return "As many blends as terms, or fewer: nothing is left for the error. --replicates 2 or --centre give one."
     terms = len(mixture_terms(letters, order))
-    df = len(plan.sequence) - terms
-    return f"The runs bear Scheffé's {order} polynomial ({terms} terms), with {df} degrees of freedom for the error."
+    df = counted(len(plan.sequence) - terms, "degree of freedom")
+    return f"The runs bear Scheffé's {order} polynomial ({terms} terms), with {df} for the error."
 
 
 def analysis_text(result: DesignResult) -> str:

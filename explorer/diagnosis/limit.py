@@ -149,11 +149,13 @@ def limit_text(found: LimitStudy, replayed: Sequence[Replayed]) -> str:
     ]
     curve = tuple(f"named, {risk:.1%} wrong" for risk in RISKS)
     head_of_rule = ("data", "strength, σ", "taught by", "sets", "most probable is right", *curve, "false names")
+    unseen = [name for name in data if name not in {row.data for row in found.rows}]
     return "\n\n".join(
         (
             text_table(head, strengths),
             text_table(("data", "effect", "looks like", "cosine", "taken for it at 6 σ"), pairs),
             text_table(("data", "pours", "strength, σ", "most probable is right", *curve), limits),
+            *(f"{name}: no effect is told from zero, so that there is no limit" for name in unseen),
             text_table(head_of_rule, rule),
         )
     )

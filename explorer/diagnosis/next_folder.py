@@ -120,9 +120,8 @@ def write_next(
 def asks_for(folder: Path, suggestion: Suggestion) -> bool:
     """Whether the follow-up in ``folder`` is ``suggestion``, for the same answers."""
     try:
-        order = json.loads(read_text(folder / ORDER, MOST_BYTES, CommandError))
-        return (order["change"], tuple(order["rivals"])) == (suggestion.experiment.name, tuple(suggestion.rivals))
-    except (ValueError, KeyError, TypeError):  # whatever it is, somebody has changed it
+        return _order(folder) == (tuple(suggestion.rivals), suggestion.experiment.name)
+    except CommandError:  # whatever it is, somebody has changed it
         return False
 
 
@@ -132,6 +131,20 @@ def read_next(folder: Path) -> NextFolder:
     Raises CommandError for what is not such a folder or holds no value yet, MeasurementError for data that cannot be
     read; each one line naming file and key.
     """
+    rivals, change = _order(folder)
+    try:
+        return NextFolder(rivals, change, load_measurement(folder))
+    except MeasurementError:
+        for table in sorted(folder.glob("*.csv")):
+            if not _holds_value(table):
+                raise CommandError(
+                    f"{table}: value: none is filled in yet; take the # off a row and write what was measured"
+                ) from None
+        raise
+
+
+def _order(folder: Path) -> tuple[tuple[str, ...], str]:
+    """Rivals and change of the follow-up in ``folder``; raises CommandError for what is no such file."""
     path = folder / ORDER
     try:
         order = json.loads(read_text(path, MOST_BYTES, CommandError))
@@ -147,15 +160,7 @@ def read_next(folder: Path) -> NextFolder:
         )
     if not isinstance(change, str):
         raise CommandError(f"{path}: change: {change!r:.60}; allowed: the name of a change")
-    try:
-        return NextFolder(tuple(rivals), change, load_measurement(folder))
-    except MeasurementError:
-        for table in sorted(folder.glob("*.csv")):
-            if not _holds_value(table):
-                raise CommandError(
-                    f"{table}: value: none is filled in yet; take the # off a row and write what was measured"
-                ) from None
-        raise
+    return tuple(rivals), change
 
 
 def _is_label(label: Any) -> bool:

@@ -13,9 +13,10 @@ from explorer.units import (
     fixed,
     observable_label,
     observed,
+    observed_number,
     parameter_label,
-    signed,
     unit_of_observable,
+    with_sign,
 )
 
 EFFECTS_SHOWN = 12
@@ -70,9 +71,10 @@ def _of_target(result: StudyResult, observable: str) -> dict[str, str]:
     )
     if test.deciding is not None:
         middle, low, high = (
-            unit.of(value) for value in (test.deciding.difference, test.deciding.low, test.deciding.high)
+            with_sign(observed_number(observable, value))
+            for value in (test.deciding.difference, test.deciding.low, test.deciding.high)
         )
-        cells["difference from the target"] = f"{unit.attach(signed(middle))} ({signed(low)} … {signed(high)})"
+        cells["difference from the target"] = f"{unit.attach(middle)} ({low} … {high})"
     return cells | {"verdict": test.verdict}
 
 
@@ -106,11 +108,11 @@ def _optimum(result: StudyResult) -> dict[str, str]:
 def _effects_of(result: StudyResult) -> dict[str, tuple[float, str]]:
     """Path → (effect, effect with its interval)."""
     part = result.screening
-    paths, unit = {f.name: f.path for f in part.factors}, unit_of_observable(part.response)
+    paths = {f.name: f.path for f in part.factors}
     found = {}
     for effect in part.analysis.factor_effects():
         half = part.analysis.half_width(effect)
-        text = unit.attach(signed(unit.of(effect.effect)))
-        text += "" if math.isnan(half) else f" ± {fixed(unit.of(half))}"
+        text = with_sign(observed(part.response, effect.effect))
+        text += "" if math.isnan(half) else f" ± {observed_number(part.response, half)}"
         found[paths[effect.name]] = (effect.effect, text)
     return found

@@ -87,7 +87,9 @@ def rule(optimum: OptimumResult, reference: str) -> str:
 
 
 def cloud_caution(optimum: OptimumResult) -> str:
-    """What the scatter of the refits does not tell, as a sentence; empty where every factor is identified."""
+    """What the scatter of the refits does not tell, as a sentence; empty where one target identifies every factor."""
+    if optimum.compromise is not None:
+        return "The refits are of the first target alone, the star is the setting of all targets."
     open_ = [s.name for s in settings(optimum) if not s.identified]
     if not open_:
         return ""

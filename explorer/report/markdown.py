@@ -22,7 +22,8 @@ from explorer.report.content import (
     Text,
 )
 
-SPECIAL = re.compile(r"([\\*_\[\]<>#|])")
+SPECIAL = re.compile(r"([\\*_\[\]<>#|~$]|&(?=#?\w+;))")
+"""What makes emphasis, links, elements, headings, cells, struck or mathematical text, and characters by name."""
 
 
 def document(report: Report) -> str:

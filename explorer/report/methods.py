@@ -5,9 +5,11 @@ Every number in it is one of the result; a source is cited where the text names 
 
 from __future__ import annotations
 
-from collections import Counter
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from doe.analysis.verification import Verification
 from doe.designs import DESIGNS as FAMILIES
@@ -22,6 +24,7 @@ from doe.target import Target
 from explorer.report.content import Reference, Section
 from explorer.report.sources import SOURCES, citations, methods_section, software
 from explorer.units import (
+    counted,
     enumeration,
     fixed,
     number,
@@ -35,6 +38,7 @@ from explorer.units import (
 from solver.laws import CONTACT_LAWS, HertzMindlin, LinearSpringDashpot
 
 if TYPE_CHECKING:
+    from doe.analysis.analyse import DesignAnalysis
     from doe.audit import Audit
     from explorer.design.plan_result import PlanResult
     from explorer.design.result import DesignResult
@@ -57,6 +61,7 @@ DESIGNS = {
     "I-optimal": ("meyer1995",),
     "mixture": ("scheffe1958",),
     "Latin hypercube": ("mckay1979",),
+    "Morris": ("morris1991",),
 }
 WITHOUT_SOLVER = ("taichi",)
 """Programs of a result that nothing was simulated for."""
@@ -136,11 +141,11 @@ def photograph_methods(result: PhotographResult) -> Methods:
 def design_methods(result: DesignResult) -> Methods:
     """The paragraph of an analysed design: the runs, and the tests and models that their analysis used."""
     found, runs = result.analysis, result.runs
-    family = _family(result.design)
+    family, settings = _family(result.design), len(np.unique(result.coded.round(9), axis=0))
+    design = f", {_article(family)} {family} design{citations(DESIGNS.get(family, ()))}," if family else ""
     text = (
-        f"{runs.valid} runs at {runs.rows} settings of {len(result.factors)} factors"
-        f"{f', a {family} design' if family else ''}{citations(DESIGNS.get(family, ()))}, were analysed for "
-        f"{result.response.name.replace('_', ' ')}; {runs.missing} had no result."
+        f"{counted(runs.valid, 'run')} at {counted(settings, 'setting')} of {counted(len(result.factors), 'factor')}"
+        f"{design} were analysed for {result.response.name.replace('_', ' ')}; {runs.missing} had no result."
     )
     if found.effects is not None:
         error = found.effects.screening.error_source
@@ -155,10 +160,10 @@ def design_methods(result: DesignResult) -> Methods:
         anova = found.model.anova
         terms = int(found.model.surface.included.sum()) - 1
         text += (
-            f" A polynomial of {terms} terms was fitted by least squares{citations(('myers2016',))}; sums of squares "
-            f"are partial (Type III). R² is {fixed(anova.r_squared, 4)}, "
-            f"predicted {fixed(anova.r_squared_predicted, 4)}."
+            f" A polynomial of {counted(terms, 'term')} was fitted by least squares{citations(('myers2016',))}; sums "
+            f"of squares are partial (Type III). {_explained(anova.r_squared, anova.r_squared_predicted)}"
         )
+    text += _other_models(found)
     if found.mixture is not None:
         text += f" Scheffé’s polynomial{citations(('scheffe1958',))} stands for the model of the mixture."
     if "--reduce" in result.command:
@@ -168,20 +173,54 @@ def design_methods(result: DesignResult) -> Methods:
     return methods_section(text, _without_solver(result.versions), "Analysed")
 
 
+def _other_models(found: DesignAnalysis) -> str:
+    """What stands for the polynomial, or beside it."""
+    text = ""
+    if found.elementary is not None:
+        text += (
+            f" Elementary effects{citations(('morris1991',))} were tested by Student’s t, corrected by Holm’s procedure"
+            f"{citations(('holm1979',))}."
+        )
+    if found.named is not None:
+        text += (
+            " A linear model, names by effects that add up to zero, was fitted by least squares; sums of squares are "
+            f"partial (Type III). {_explained(found.named.r_squared, found.named.r_squared_predicted)}"
+        )
+    if found.random is not None:
+        text += (
+            f" A model with {len(found.random.groups)} groups drawn at random was fitted by restricted maximum "
+            f"likelihood{citations(('patterson1971',))}; terms were tested by F with the degrees of freedom of "
+            f"Satterthwaite{citations(('satterthwaite1946',))}."
+        )
+    if found.surrogate is not None:
+        text += f" A Gaussian process was fitted by maximum likelihood{citations(('rasmussen2006',))}."
+    return text
+
+
+def _explained(r_squared: float, predicted: float) -> str:
+    """Of a response that never changes there is none, and none is predicted where a run is fitted exactly."""
+    if not math.isfinite(r_squared):
+        return "Nothing varies that a model could explain."
+    return f"R² is {fixed(r_squared, 4)}{f', predicted {fixed(predicted, 4)}' if math.isfinite(predicted) else ''}."
+
+
 def plan_methods(result: PlanResult) -> Methods:
     """The paragraph of a planned experiment: family, size, order of the runs, and what it will see."""
     family = _family(result.design)
     text = (
-        f"A {family} design{citations(DESIGNS.get(family, ()))} of {len(result.coded)} rows over "
-        f"{len(result.factors)} factors was made, {result.replicates} runs of each: {len(result.sequence)} runs"
+        f"{_article(family).capitalize()} {family} design{citations(DESIGNS.get(family, ()))} of {len(result.coded)} "
+        f"rows over {counted(len(result.factors), 'factor')} was made, {counted(result.replicates, 'run')} of each: "
+        f"{counted(len(result.sequence), 'run')}"
         f"{f' in {max(result.block)} blocks' if result.block else ''}. Order of the runs and whatever of the design is "
         f"drawn: seed {result.seed}."
     )
     if result.power:
+        known = (
+            f", for a standard deviation of one run of {number(result.sigma)}" if math.isfinite(result.sigma) else ""
+        )
         text += (
             f" The smallest change that the {result.model} model will see with a chance of 0.8 at p < 0.05 is that "
-            f"of the noncentral t{citations(('cohen1988',))}"
-            f"{f', for a standard deviation of one run of {number(result.sigma)}' if result.sigma else ''}."
+            f"of the noncentral t{citations(('cohen1988',))}{known}."
         )
     return methods_section(text, _without_solver(result.versions), "Made")
 
@@ -206,6 +245,10 @@ def _family(design: str) -> str:
     return FAMILIES[design].title if design in FAMILIES else design
 
 
+def _article(family: str) -> str:
+    return "an" if family[:1] in "aeiouI" else "a"
+
+
 def _model(result: StudyResult) -> str:
     contact = result.study.contact
     law = contact.get("law", HertzMindlin.name)
@@ -219,10 +262,13 @@ def _model(result: StudyResult) -> str:
         f", at a time step of {number(1e6 * found.dt)} µs (at most {fraction} of the Rayleigh time of the smallest "
         "sphere)."
     )
-    bodies = Counter(found.materials.values()).total()
-    shapes = [f"{shape.body} ({shape.fit.n_spheres} spheres)" for shape in result.shapes]
+    kinds = len(found.materials)
+    shapes = [f"{shape.body} ({counted(shape.fit.n_spheres, 'sphere')})" for shape in result.shapes]
     return (
-        f"{text} {bodies} kinds of body were poured, as clumps of spheres: {enumeration(shapes)}." if shapes else text
+        f"{text} {'One kind of body was' if kinds == 1 else f'{kinds} kinds of body were'} poured, as clumps of "
+        f"spheres: {enumeration(shapes)}."
+        if shapes
+        else text
     )
 
 
@@ -265,9 +311,9 @@ def _designs(result: StudyResult) -> str:
     return (
         f"{totals.total} pours ({totals.valid} valid) with seeds drawn from {study.seed} were run: "
         f"{result.pilot.noise[target.observable].runs} of one setting for the noise; a {screening} design of "
-        f"{analysis.rows} rows{citations(DESIGNS.get(screening, ()))} over {len(result.screening.factors)} factors; a "
-        "walk of "
-        f"steepest ascent{citations(('box1951',))} in {len(result.ascent.means)} steps{together}; and a {surface} "
+        f"{analysis.rows} rows{citations(DESIGNS.get(screening, ()))} over "
+        f"{counted(len(result.screening.factors), 'factor')}; a walk of steepest ascent{citations(('box1951',))} in "
+        f"{counted(len(result.ascent.means), 'step')}{together}; and a {surface} "
         f"design of {len(result.surface.design)} points{citations(DESIGNS.get(surface, ()))} over "
         f"{enumeration(names)}. {_read(result.pilot.estimator, study.targets)}"
     )

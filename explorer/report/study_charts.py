@@ -14,7 +14,7 @@ from doe.stages.surface import OptimumResult
 from doe.studies.study_result import AnyStudy
 from explorer.report.content import Spec
 from explorer.report.figures.effects import all_effects, errors_at_hand, half_normal, main_effects, pareto_against
-from explorer.report.figures.model import FittedTarget, cloud, fitted_targets, ranges
+from explorer.report.figures.model import MOST_PANELS, FittedTarget, cloud, fitted_targets, ranges
 from explorer.report.figures.posterior import corner, overlaid
 from explorer.report.figures.pours import ascent_path, noise_of_estimators, scan, verification
 from explorer.report.figures.style import short_rows, stacked
@@ -93,8 +93,9 @@ def _surface(result: AnyStudy) -> Named:
 def surface_plots(fitted: FittedTarget, of: str = "") -> Named:
     """Title → plot of a response surface; ``of`` ends the titles."""
     names = [factor.name for factor in fitted.factors]
-    caption = "The others at the optimum, or the middle before there is one. Thick line: model = target."
-    yield f"Contours{of}", Plot(lambda: stacked(contours(fitted)), caption, 2.2)
+    if 1 < len(names) <= MOST_PANELS:
+        caption = "The others at the optimum, or the middle before there is one. Thick line: model = target."
+        yield f"Contours{of}", Plot(lambda: stacked(contours(fitted)), caption, 2.2)
     for i, j in combinations(range(len(names)), 2):
         caption = "Observed pours are drawn at their own height, whatever the other factor was."
         title = f"Surface in 3-D, {names[i]} and {names[j]}{of}"
@@ -125,8 +126,9 @@ def _optimum(result: AnyStudy) -> Named:
 
 def optimum_plots(fitted: FittedTarget, optimum: OptimumResult) -> Named:
     """Title → plot of how well the optimum of a surface is known."""
-    caption = f"Each dot: the point chosen from one resampling. {cloud_caution(optimum)}".rstrip()
-    yield "Optimum and its refits", Plot(lambda: stacked(cloud(fitted)), caption, 2.0)
+    if 1 < len(fitted.factors) <= MOST_PANELS:
+        caption = f"Each dot: the point chosen from one resampling. {cloud_caution(optimum)}".rstrip()
+        yield "Optimum and its refits", Plot(lambda: stacked(cloud(fitted)), caption, 2.0)
     caption = "Shares of the screened ranges."
     yield "Ranges of the optimum", Plot(lambda: short_rows(ranges(fitted)), caption, 0.9)
 

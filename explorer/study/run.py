@@ -49,7 +49,7 @@ from explorer.report import write_report
 from explorer.report.set_up import set_up_of
 from explorer.study.duration import duration_text
 from explorer.study.process import PARTIAL, RESULT
-from solver import Executor, executor, pour_rig, run_queue, unpacked
+from solver import Executor, RawPourError, executor, pour_rig, run_queue, unpacked
 from solver.arch import chosen
 from solver.observables.made_up import estimator_bias
 from solver.observables.repose import AZIMUTHS_DEG, flank_feet, outline
@@ -192,7 +192,10 @@ def _run(
 
 
 def poured_piles(stages: Stages, store: Store) -> tuple[PouredPile, ...]:
-    """Mean silhouettes at the reference setting and at the optimum, read off the stored pours; none that are lost."""
+    """Mean silhouettes at the reference setting and at the optimum, read off the stored pours.
+
+    None of those that are lost or damaged: their numbers are in the result, which is not to be lost with them.
+    """
     chosen = (
         ("reference", stages.reference_runs()),
         ("optimum", stages.own_runs_of("verification")),
@@ -216,7 +219,10 @@ def _silhouettes(run: StoredRun | None) -> list[tuple[FloatArray, FloatArray]]:
     """Outlines (u, z) [m] of a stored pile from several sides, u = 0 between the feet of its flanks."""
     if run is None or not run.raw:
         return []
-    spheres = unpacked(run.raw).pile.spheres
+    try:
+        spheres = unpacked(run.raw).pile.spheres
+    except RawPourError:
+        return []
     found = []
     for azimuth in AZIMUTHS_DEG[::3]:
         view = outline(spheres, azimuth)

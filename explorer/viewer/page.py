@@ -9,6 +9,7 @@ watches them.
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections import deque
@@ -125,7 +126,7 @@ class Page:
         frames = FrameClock(FRAME_INTERVAL)
         while not stop.is_set():
             notice = self._actions.carry_out()
-            self._notice = self._notice if notice is None else notice
+            self._notice = self._notice if notice is None else self._without_folder(notice)
             frame = self._session.frame()
             status = self._session.status()
             happened = (*self._session.new_events(), *self._orders.of_the_pour(status))
@@ -139,6 +140,10 @@ class Page:
                 now = Now(status, frame or preview, self._events, self._notice, preview is not None)
                 self._show(now, notice is not None or bool(happened))
             frames.wait(stop)
+
+    def _without_folder(self, notice: str) -> str:
+        """``notice`` with a file that was sent called as it is in the lists: its folder says nothing to who sent it."""
+        return notice.replace(f"{self._context.uploads}{os.sep}", "")
 
     def _record(self, frame: Frame, status: Status) -> None:
         """Hand on what is shown; a recorder that cannot go on, with its folder gone, is told and left out."""

@@ -103,10 +103,16 @@ def unpacked(raw: bytes) -> Record:
     RawPourError for bytes that are no raw pour, or one of another format or of a rig that is not known.
     """
     try:
-        arrays = npz_arrays(raw)
-        head = json.loads(bytes(arrays["head"]))
-    except (KeyError, TypeError, ValueError) as error:
-        raise RawPourError(f"not a raw pour, or a damaged one ({error})") from None
+        return _unpacked(raw)
+    except RawPourError:
+        raise
+    except (AttributeError, LookupError, TypeError, ValueError, OverflowError, RecursionError) as error:
+        raise RawPourError(f"not a raw pour, or a damaged one ({error})") from error
+
+
+def _unpacked(raw: bytes) -> Record:
+    arrays = npz_arrays(raw)
+    head = json.loads(bytes(arrays["head"]))
     if head.get("format") != FORMAT:
         raise RawPourError(f"a raw pour of format {head.get('format')!r}; this program reads {FORMAT}")
     scene = Scene(

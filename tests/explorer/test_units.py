@@ -14,6 +14,7 @@ from doe.designs import factorial
 from doe.run_records import sample_of
 from explorer.units import (
     code,
+    counted,
     number,
     observable_label,
     observed,
@@ -105,3 +106,13 @@ def test_a_label_has_no_unit_in_it():
     assert [observable_label(name) for name in names] == [
         *("apex height", "bulk density", "discharge t10", "dynamic angle, drum", "stray fraction")
     ]
+
+
+def test_one_is_singular():
+    assert [counted(n, "degree of freedom") for n in (1, 2)] == ["1 degree of freedom", "2 degrees of freedom"]
+    assert [counted(n, "factor") for n in (0, 1)] == ["0 factors", "1 factor"]
+
+
+def test_no_digits_are_made_up_for_a_large_value():
+    assert observed(own_path("load", "N"), 269859940865.84) == "2.699e+11 N"
+    assert observed(own_path("load", "N"), -999999.0) == "−999999.00 N"

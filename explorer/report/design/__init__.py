@@ -12,6 +12,7 @@ from explorer.report.design.sections import banner, sections_of
 from explorer.report.html import page
 from explorer.report.markdown import document
 from explorer.report.methods import design_methods
+from explorer.units import counted
 
 __all__ = ["design_html", "design_markdown", "design_report"]
 
@@ -21,7 +22,7 @@ def design_report(result: DesignResult) -> Report:
     kind = f"{result.design} design" if result.design else "Design"
     return Report(
         title=result.response.name.replace("_", " "),
-        subtitle=f"{kind} of {len(result.factors)} factors, analysed from {Path(result.sheet).name}",
+        subtitle=f"{kind} of {counted(len(result.factors), 'factor')}, analysed from {Path(result.sheet).name}",
         banner=banner(result),
         sections=sections_of(result),
         about=result.about,

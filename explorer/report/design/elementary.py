@@ -6,7 +6,7 @@ from doe.analysis.elementary_effects import ElementaryEffects
 from explorer.design.result import DesignResult
 from explorer.report.content import Block, Facts, Figure, Section, Spec, Table, Text
 from explorer.report.figures.style import FACTOR, axis, chart, error_bars, finite, label, points
-from explorer.units import enumeration, number, observable_title, observed, p_value, parameter_label, signed
+from explorer.units import enumeration, number, observable_title, observed, p_value, parameter_label, with_sign
 
 MOST_NAMED = 5
 
@@ -60,7 +60,7 @@ def elementary_table(result: DesignResult, found: ElementaryEffects) -> Table:
             parameter_label(title[one.factor]),
             str(len(one.effects)),
             f"{observed(response, one.mu_star)} ± {number(one.mu_star_half_width)}",
-            signed(one.mu, 4),
+            with_sign(number(one.mu, 4)),
             number(one.sigma, 4),
             number(one.sigma / one.mu_star if one.mu_star else None),
             p_value(one.p),

@@ -9,7 +9,7 @@ from explorer.design.result import DesignResult
 from explorer.report.content import Block, Facts, Figure, Folded, Section, Spec, Table, Text
 from explorer.report.design.names import means_table
 from explorer.report.figures.style import FACTOR, axis, chart, horizontal_line, label, points
-from explorer.units import enumeration, number, observable_title, observed, p_value, percent, signed, term_text
+from explorer.units import enumeration, number, observable_title, observed, p_value, percent, term_text, with_sign
 
 ACTS = 0.05
 
@@ -98,7 +98,7 @@ def estimates_table(found: RandomFit) -> Table:
 def groups_table(found: RandomFit) -> Table:
     """Every group: its runs and its predicted effect."""
     rows = tuple(
-        (name, str(runs), signed(effect, 4))
+        (name, str(runs), with_sign(number(effect, 4)))
         for name, runs, effect in zip(found.groups, found.runs_of_group.tolist(), found.effects.tolist(), strict=True)
     )
     return Table(("group", "runs", "effect"), rows)

@@ -16,10 +16,22 @@ from explorer.design.result import DesignResult, DrawnEffects, SheetFactor
 from explorer.report.content import Block, Bullets, Facts, Figure, Folded, Section, Table, Text
 from explorer.report.design.charts import box_cox_profile, single_runs
 from explorer.report.figures.effects import half_normal, main_effects, pareto
-from explorer.report.figures.model import FittedTarget, profiler
+from explorer.report.figures.model import MOST_PANELS, FittedTarget, profiler
 from explorer.report.figures.surface import contours, fit, height_over, residual_quantiles
 from explorer.report.sections.surface import anova_table, equation, variance_table
-from explorer.units import MISSING, enumeration, fixed, number, observed, p_value, parameter_value, signed, term_text
+from explorer.units import (
+    MISSING,
+    counted,
+    enumeration,
+    fixed,
+    number,
+    observed,
+    p_value,
+    parameter_value,
+    percent,
+    term_text,
+    with_sign,
+)
 
 MOST_ALIASES = 4
 """Effects that share a column and are listed by name."""
@@ -113,7 +125,7 @@ def effect_table(part: DrawnEffects) -> Table:
             (
                 term_text(name) + (" (error)" if effect.is_dummy else ""),
                 also_holds(part.aliases.get(name, ())),
-                signed(effect.effect, 4),
+                with_sign(number(effect.effect or 0.0, 5)),
                 number(effect.sum_of_squares, 5),
                 fixed(effect.contribution_percent, 2),
                 MISSING if by_replicates is None else p_value(by_replicates.p),
@@ -142,7 +154,7 @@ def few_terms_table(models: Sequence[FewTermsModel]) -> Table:
     rows = tuple(
         (
             " ".join(
-                f"{signed(b, 4)} {term.replace('*', ' × ')}"
+                f"{with_sign(number(b, 4))} {term.replace('*', ' × ')}"
                 for term, b in zip(one.terms, one.coefficients[1:], strict=True)
             ),
             *(fixed(value, 4) for value in (one.r_squared, one.r_squared_adjusted)),
@@ -163,7 +175,7 @@ def curvature(found: Curvature, response: str) -> str:
     """The test of the centre runs, in a sentence."""
     return (
         f"Curvature: the corners lie {observed(response, found.difference)} from the centre runs "
-        f"(F = {number(found.f)} on 1 and {found.df_error} degrees of freedom, p = {p_value(found.p)})."
+        f"(F = {number(found.f)} on 1 and {counted(found.df_error, 'degree of freedom')}, p = {p_value(found.p)})."
     )
 
 
@@ -198,16 +210,12 @@ def _errors(part: DrawnEffects) -> list[tuple[str, str]]:
             found.append(
                 (
                     title,
-                    f"σ = {observed(response, error.sigma)}, {error.df} degrees of freedom; margin of one effect "
-                    f"{observed(response, error.margin)}, of all {observed(response, error.margin_bonferroni)}; "
+                    f"σ = {observed(response, error.sigma)}, {counted(error.df, 'degree of freedom')}; margin of one "
+                    f"effect {observed(response, error.margin)}, of all {observed(response, error.margin_bonferroni)}; "
                     f"seen with chance 0.8: {observed(response, error.smallest_detectable_effect)}",
                 )
             )
     return found
-
-
-MOST_PANELS = 3
-"""Factors up to which every pair of them is drawn side by side."""
 
 
 def model(result: DesignResult) -> Section | None:
@@ -227,7 +235,7 @@ def model(result: DesignResult) -> Section | None:
                        f"{fixed(anova.r_squared_predicted, 4)} (PRESS {number(anova.press, 4)}), by whole rows "
                        f"{fixed(anova.r_squared_predicted_by_row, 4)}"),
                 ("Scatter", f"σ = {observed(response, anova.sigma)}, mean {observed(response, anova.mean)}, "
-                            f"coefficient of variation {fixed(anova.cv_percent)} %"),
+                            f"coefficient of variation {percent(anova.cv_percent / 100, 2)}"),
                 ("Adequate precision", f"{fixed(anova.adequate_precision)} (above 4 is wanted)"),
             )
         ),

@@ -22,7 +22,6 @@ from explorer.units import (
     parameter_label,
     parameter_value,
     percent,
-    signed,
     with_sign,
 )
 
@@ -92,7 +91,7 @@ def means_table(result: DesignResult, means: Sequence[NameMean]) -> Table:
             f"{title[one.factor]}: {one.name}",
             observed(response, one.mean),
             f"{observed(response, one.low)} … {observed(response, one.high)}",
-            signed(one.effect, 4),
+            with_sign(number(one.effect, 4)),
             number(one.standard_error),
             p_value(one.p),
         )

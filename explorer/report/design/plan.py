@@ -39,7 +39,7 @@ from explorer.report.figures.style import (
     line,
 )
 from explorer.report.methods import plan_methods
-from explorer.units import enumeration, number
+from explorer.units import counted, enumeration, number
 
 MOST_ROWS = 60
 """Runs that the page lists; the data have all."""
@@ -185,14 +185,17 @@ def _power(result: PlanResult) -> Section:
         for one in found
     )
     header = ("change, low to high", "terms", "standard error", "seen with chance 0.8", "for all at once")
-    caption = f"The {result.model} model at p < 0.05, in {unit}; {found[0].df} degrees of freedom for the error."
+    caption = (
+        f"The {result.model} model at p < 0.05, in {unit}; {counted(found[0].df, 'degree of freedom')} for the error."
+    )
     names = any(one.df_term > 1 for one in found)
     caption += f" {OF_NAMES}" if names else ""
     blocks: tuple[Block, ...] = (
         Figure(
             "power",
             power(found, unit),
-            f"{found[0].df} degrees of freedom; noncentral {'t and F' if names else 't'}, p < 0.05, one term alone.",
+            f"{counted(found[0].df, 'degree of freedom')}; noncentral {'t and F' if names else 't'}, "
+            "p < 0.05, one term alone.",
         ),
         Table((*header, *([asked] if asked else [])), rows, caption),
     )

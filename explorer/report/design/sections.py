@@ -21,7 +21,7 @@ from explorer.report.design.groups import ACTS, group_facts, groups
 from explorer.report.design.model import blend_words, diagnostics, effects, mixture, model, units_of_factors
 from explorer.report.design.names import fit_facts, names, target_words
 from explorer.report.design.surrogate import better_words, surrogate, target_facts
-from explorer.report.figures.model import cloud, ranges
+from explorer.report.figures.model import MOST_PANELS, cloud, ranges
 from explorer.report.figures.surface import solutions
 from explorer.report.identified import GIVES_TARGET, cloud_caution, rule, settings
 from explorer.report.methods import design_methods
@@ -44,8 +44,6 @@ from explorer.units import (
 
 WHOLE = ("block", "model", "residual", "lack_of_fit", "pure_error", "total")
 """Rows of an analysis of variance that are no terms."""
-MOST_PANELS = 3
-"""Factors up to which every pair of them has a panel."""
 REPEAT_RUNS = "Repeat runs: replicates or centre runs show how large the noise is."
 
 
@@ -83,7 +81,7 @@ def target(result: DesignResult) -> Section | None:
                 "solutions", surface, f"{n}. Every setting on the green surface gives the target in the fitted model."
             )
         )
-    blocks.append(Figure("ranges", ranges(fitted), ranges_caption(optimum)))
+    blocks.append(Figure("ranges", ranges(fitted), ranges_caption(optimum, n)))
     if 1 < len(result.factors) <= MOST_PANELS:
         caption = (
             f"n = {len(found.bootstrap_points)} refits to resampled {found.resampling} (bootstrap); each dot is the "
@@ -222,7 +220,7 @@ def banner(result: DesignResult) -> Banner:
             Word.EFFECT_FOUND,
             enumeration(acts),
             f"Of {result.runs.valid} runs: {acting_words(result)}.",
-            "Ask for the settings of a value: `explorer analyse … --target`.",
+            _then(result),
         )
     if not _tested(result):
         return Banner(Word.NO_ANSWER, "", f"Of {result.runs.valid} runs: {acting_words(result)}.", REPEAT_RUNS)
@@ -232,6 +230,15 @@ def banner(result: DesignResult) -> Banner:
         f"Of {result.runs.valid} runs: {acting_words(result)}.",
         "Add replicates or widen low … high; `explorer design --sigma` says what a design will see.",
     )
+
+
+def _then(result: DesignResult) -> str:
+    """What to do once something acts; blends and groups drawn at random take no target."""
+    if result.analysis.mixture is not None:
+        return "Run the highest and the lowest blend again, and compare."
+    if result.analysis.random is not None:
+        return "Ask for the settings of a value, the groups as blocks: `explorer analyse … --block … --target`."
+    return "Ask for the settings of a value: `explorer analyse … --target`."
 
 
 def acting_words(result: DesignResult) -> str:
@@ -414,10 +421,13 @@ def all_runs(result: DesignResult) -> Section | None:
 
 def repeat(result: DesignResult) -> Section:
     """The command that gives the same answer."""
-    text = (
-        "Sums of squares are partial (Type III). Bootstrap refits have a fixed seed, so the same sheet gives the same "
-        "numbers; `result.json` holds all of them."
-    )
+    found = result.analysis
+    text = "The same sheet gives the same numbers"
+    if found.optimum is not None:
+        text = "Bootstrap refits have a fixed seed, so the same sheet gives the same numbers"
+    if found.model is not None or found.named is not None:
+        text = f"Sums of squares are partial (Type III). {text}"
+    text += "; `result.json` holds all of them."
     versions = tuple((name, version or "not installed") for name, version in result.versions.items())
     command = Code(shlex.join(result.command))
     return Section("How to repeat", (Text(text), command, Table(("program", "version"), versions)))

@@ -30,6 +30,7 @@ from explorer.report.figures.style import (
     chart,
     label,
     points,
+    rounded,
     side_by_side,
     suffix,
     vertical_line,
@@ -189,7 +190,7 @@ def map_chart(picture: ResidualMap) -> Spec:
     """Measured minus poured height over the plate [mm], before and after, with lines of the measured height."""
     measured = MM * picture.measured
     n = len(measured)
-    at = (MM * picture.pixel * (np.arange(n) + 0.5 - n / 2)).round(3).tolist()
+    at = rounded(MM * picture.pixel * (np.arange(n) + 0.5 - n / 2))
     differences = (("before", picture.before), ("after", picture.after))
     reach = max(float(np.abs(MM * one.height).max()) for _, one in differences) or 1.0
     colours: Json = {"colorscale": BELOW_TO_ABOVE, "cmin": -reach, "cmax": reach}
@@ -207,14 +208,14 @@ def map_chart(picture: ResidualMap) -> Spec:
                 "name": words,
                 "x": at,
                 "y": at,
-                "z": (MM * difference.height).T.round(3).tolist(),
+                "z": rounded(MM * difference.height.T),
                 "customdata": difference.z.T.round(1).tolist(),
                 "coloraxis": "coloraxis",
                 "hovertemplate": "x %{x:.0f} mm, y %{y:.0f} mm<br>%{z:+.2f} mm, %{customdata:+.1f} σ<extra></extra>",
             }
             | axes
         )
-        heights: Json = {"type": "contour", "x": at, "y": at, "z": measured.T.round(2).tolist(), "ncontours": 6}
+        heights: Json = {"type": "contour", "x": at, "y": at, "z": rounded(measured.T), "ncontours": 6}
         lines: Json = {"contours": {"coloring": "none"}, "line": {"width": 0.8, "color": INK}, "hoverinfo": "skip"}
         traces.append(heights | lines | {"showscale": False} | axes)
         title = f"x [mm], {words}"

@@ -33,7 +33,7 @@ from explorer.report.figures.style import (
     suffix,
     vertical_line,
 )
-from explorer.units import fixed, number, observable_title, parameter_label, unit_of_observable
+from explorer.units import counted, fixed, number, observable_title, parameter_label, unit_of_observable
 
 ROW_HEIGHT = 19
 """Height of one bar or interval [px]."""
@@ -110,7 +110,7 @@ def pareto_against(screening: EffectsOf, errors: list[ErrorSource]) -> Spec:
                 "hovertemplate": "%{y}<br>|t| = %{x:.2f}<extra></extra>",
             }
         )
-        title = f"|t| against the {error} ({estimate.df} degrees of freedom)"
+        title = f"|t| against the {error} ({counted(estimate.df, 'degree of freedom')})"
         layout[f"xaxis{suffix(k)}"] = axis(title, domain=domains[k], rangemode="tozero", anchor="y")
         for limit, words, dash, anchor in (
             (estimate.t_limit, "one factor", "dash", "right"),
@@ -137,7 +137,7 @@ def half_normal(screening: EffectsOf) -> Spec:
             names = [label(known[k].name) for k in chosen]
             shown = [name if k >= len(known) - LABELLED else "" for k, name in zip(chosen, names, strict=True)]
             more = {"mode": "markers+text", "text": shown, "textposition": "middle left", "textfont": {"size": 11}}
-            more |= {"customdata": names, "hovertemplate": "%{customdata}: %{y:.2f}<extra></extra>"}
+            more |= {"customdata": names, "hovertemplate": "%{customdata}: %{y:.4g}<extra></extra>"}
             traces.append(points([quantile[k] for k in chosen], sizes, name, colour, **more))
     lenth = analysis.lenth
     margins = {"Lenth's margin, one effect": lenth.margin, "all effects": lenth.simultaneous_margin}
@@ -181,7 +181,7 @@ def main_effects(screening: EffectsOf) -> Spec | None:
         place = {"xaxis": f"x{suffix(k)}", "yaxis": f"y{suffix(k)}"}
         drawn = {"mode": "lines+markers", "line": line(FACTOR), "error_y": error_bars([width, width], FACTOR)}
         name = effect.name
-        hover = {"hovertemplate": label(name) + " %{x}: %{y:.2f}" + unit.symbol + "<extra></extra>"}
+        hover = {"hovertemplate": label(name) + " %{x}: %{y:.4g}" + unit.symbol + "<extra></extra>"}
         traces.append(
             points(["low", "high"], [middle - shift, middle + shift], name, FACTOR, **drawn, **place, **hover)
         )
@@ -235,7 +235,7 @@ def all_effects(screening: ScreeningResult, assumptions: ScreeningResult | None)
                     colour,
                     marker={"symbol": mark},
                     error_x=error_bars(widths, colour),
-                    hovertemplate="%{y}<br>%{x:+.2f}" + unit.symbol + "<extra></extra>",
+                    hovertemplate="%{y}<br>%{x:+.3~g}" + unit.symbol + "<extra></extra>",
                 )
             )
     layout: Json = {

@@ -36,6 +36,7 @@ from explorer.report.figures.style import (
     label,
     line,
     points,
+    rounded,
     side_by_side,
     suffix,
 )
@@ -53,6 +54,8 @@ Array = npt.NDArray[np.float64]
 
 TRACE_POINTS = 31
 """Points along each factor of the profiler."""
+MOST_PANELS = 3
+"""Factors up to which every pair of them has a panel."""
 ROW_GAP = 0.13
 """Space between two rows of the profiler, for the title of the axis [share of the height]."""
 
@@ -99,6 +102,46 @@ class FittedTarget:
         return self.chosen or self.model.region.centre.tolist()
 
 
+@dataclass(frozen=True)
+class PairPanel:
+    """A panel over two factors, the first to the right: their numbers, and the sizes of their units [SI].
+
+    ``axes``: what puts a trace into it; ``in_legend``: whether it is the first of its row, whose traces the legend has.
+    """
+
+    pair: tuple[int, int]
+    sizes: tuple[float, float]
+    axes: Json
+    in_legend: bool
+
+
+def pair_panels(fitted: FittedTarget) -> tuple[list[PairPanel], Json]:
+    """A panel for each pair of factors, of which there is one at least, side by side, and the layout of their axes."""
+    factors = fitted.factors
+    pairs = list(combinations(range(len(factors)), 2))
+    panels: list[PairPanel] = []
+    layout: Json = {}
+    for panel, ((i, j), domain) in enumerate(zip(pairs, side_by_side(len(pairs), 0.1), strict=True)):
+        x, y = f"x{suffix(panel)}", f"y{suffix(panel)}"
+        across, up = (axis_title(factors[k].path, factors[k].name) for k in (i, j))
+        layout |= {
+            f"xaxis{suffix(panel)}": axis(across, domain=domain, anchor=y),
+            f"yaxis{suffix(panel)}": axis(up, anchor=x),
+        }
+        sizes = unit_of_parameter(factors[i].path).size, unit_of_parameter(factors[j].path).size
+        panels.append(PairPanel((i, j), sizes, {"xaxis": x, "yaxis": y}, panel == 0))
+    return panels, layout
+
+
+def chosen_star(fitted: FittedTarget, panel: PairPanel) -> list[Json]:
+    """The chosen point in a panel, if there is one."""
+    if fitted.chosen is None:
+        return []
+    x, y = (fitted.chosen[k] / size for k, size in zip(panel.pair, panel.sizes, strict=True))
+    star = {"size": 13, "symbol": "star", "line": {"color": "#ffffff", "width": 1}}
+    return [points([x], [y], fitted.chosen_name, CHOSEN, marker=star, showlegend=panel.in_legend, **panel.axes)]
+
+
 def fitted_targets(result: AnyStudy) -> tuple[FittedTarget, ...]:
     """One per target of a study; none before its surface."""
     if result.surface is None:
@@ -140,14 +183,14 @@ def profiler(fitted: FittedTarget, natural: Sequence[float]) -> Spec:
         size = unit_of_parameter(factor.path).size
         x = ((region.centre[row] + region.half_width[row] * coded) / size).tolist()
         at = natural[row] / size
-        low, high = (means[row] - widths[row]).round(5).tolist(), (means[row] + widths[row]).round(5).tolist()
+        low, high = rounded(means[row] - widths[row]), rounded(means[row] + widths[row])
         place: Json = {"xaxis": f"x{suffix(row)}", "yaxis": f"y{suffix(row)}"}
         band: Json = {"type": "scatter", "mode": "lines", "fill": "toself", "fillcolor": INTERVAL_BAND}
         traces += [
             band | place | {"x": x + x[::-1], "y": high + low[::-1], "line": {"width": 0}, "hoverinfo": "skip"},
-            {"type": "scatter", "mode": "lines", "x": x, "y": means[row].round(5).tolist(), "line": line(FACTOR)}
+            {"type": "scatter", "mode": "lines", "x": x, "y": rounded(means[row]), "line": line(FACTOR)}
             | place
-            | {"hovertemplate": "%{x:.4g}: %{y:.2f}<extra></extra>"},
+            | {"hovertemplate": "%{x:.4g}: %{y:.4g}<extra></extra>"},
             points([at], [height], "here", CHOSEN, marker={"size": 10}, **place),
         ]
         layout |= _row(row, k, axis_title(factor.path, factor.name), [min(ends) - room, max(ends) + room])
@@ -186,49 +229,47 @@ def prediction(fitted: FittedTarget, natural: Sequence[float]) -> tuple[float, f
 def cloud(fitted: FittedTarget) -> Spec:
     """The chosen point of every bootstrap refit, for each pair of factors, with the optimum and the measured values."""
     assert fitted.optimum is not None
-    found, factors = fitted.optimum.single, fitted.factors
-    pairs = list(combinations(range(len(factors)), 2))
-    domains = side_by_side(len(pairs), 0.1)
-    sizes = np.array([unit_of_parameter(factor.path).size for factor in factors])
-    refits = (found.bootstrap_points / sizes).tolist()
-    chosen, measured = (np.array(fitted.chosen) / sizes).tolist(), (found.reference / sizes).tolist()
+    sizes = np.array([unit_of_parameter(factor.path).size for factor in fitted.factors])
+    found = fitted.optimum.single
+    refits, measured = (found.bootstrap_points / sizes).T.tolist(), (found.reference / sizes).tolist()
+    dots = {"size": 4, "color": CLOUD}
+    diamond = {"size": 10, "symbol": "diamond", "color": "#ffffff", "line": {"color": INK, "width": 1.5}}
+    panels, layout = pair_panels(fitted)
     traces: list[Json] = []
-    layout: Json = {}
-    for panel, (i, j) in enumerate(pairs):
-        shown: Json = {"xaxis": f"x{suffix(panel)}", "yaxis": f"y{suffix(panel)}", "showlegend": panel == 0}
-        dots = {"size": 4, "color": CLOUD}
-        star, cross = (
-            {"size": 13, "symbol": "star"},
-            {"size": 10, "symbol": "diamond", "color": "#ffffff", "line": {"color": INK, "width": 1.5}},
-        )
+    for panel in panels:
+        i, j = panel.pair
+        shown: Json = panel.axes | {"showlegend": panel.in_legend}
         traces += [
-            points([p[i] for p in refits], [p[j] for p in refits], "bootstrap refits", FACTOR, marker=dots, **shown),
-            points([measured[i]], [measured[j]], fitted.reference_name, DUMMY, marker=cross, **shown),
-            points([chosen[i]], [chosen[j]], fitted.chosen_name, CHOSEN, marker=star, **shown),
+            points(refits[i], refits[j], "bootstrap refits", FACTOR, marker=dots, **shown),
+            points([measured[i]], [measured[j]], fitted.reference_name, DUMMY, marker=diamond, **shown),
+            *chosen_star(fitted, panel),
         ]
-        for direction, k, other in (("x", i, "y"), ("y", j, "x")):
-            title = axis_title(factors[k].path, factors[k].name)
-            place = {"domain": domains[panel]} if direction == "x" else {}
-            layout[f"{direction}axis{suffix(panel)}"] = axis(title, anchor=f"{other}{suffix(panel)}", **place)
     return chart(traces, layout, 360)
 
 
 def ranges(fitted: FittedTarget) -> Spec:
-    """Per factor, as a share of its screened range: region, range that gives the target, optimum, measured value.
+    """Per factor, as a share of its screened range: region, what the targets leave of it, optimum, measured value.
 
-    An identified factor has the 95 % set of its optimum as well; of any other the point is a hollow star.
+    One target leaves the range that gives it, and of an identified factor the 95 % set of its optimum; several leave
+    the 95 % interval of their posterior, or without one say what the first does alone. The point of a factor that is
+    not identified is a hollow star.
     """
     assert fitted.optimum is not None
     assert fitted.chosen is not None
-    found, factors = fitted.optimum.single, fitted.factors
+    optimum, factors = fitted.optimum, fitted.factors
+    found, several = optimum.single, optimum.compromise is not None
     rows = [label(f"{factor.name} · {parameter_label(factor.path)}") for factor in factors]
-    known = [found.identifies(k) for k in range(len(factors))]
-    set_low, set_high = (_where(known, end) for end in (found.point_low, found.point_high))
-    bars = (
-        ("region of the surface", fitted.low, fitted.high, DUMMY, 22),
-        (GIVES_TARGET, found.solution_low, found.solution_high, TARGET, 12),
-        ("95 % set of the optimum (bootstrap)", set_low, set_high, CHOSEN, 5),
-    )
+    known = [optimum.estimates[factor.path].identified for factor in factors]
+    bars = [("region of the surface", fitted.low, fitted.high, DUMMY, 22)]
+    if several and (joint := optimum.posterior) is not None:
+        bars.append(("95 % interval by all targets", joint.low, joint.high, TARGET, 12))
+    else:
+        alone = ", first target alone" if several else ""
+        set_low, set_high = (_where(known, end) for end in (found.point_low, found.point_high))
+        bars += [
+            (f"{GIVES_TARGET}{alone}", found.solution_low, found.solution_high, TARGET, 12),
+            (f"95 % set of the optimum (bootstrap){alone}", set_low, set_high, CHOSEN, 5),
+        ]
     traces: list[Json] = []
     for name, lows, highs, colour, width in bars:
         for k, (factor, row) in enumerate(zip(factors, rows, strict=True)):

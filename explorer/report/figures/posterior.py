@@ -10,7 +10,7 @@ import numpy as np
 from doe.analysis.joint_posterior import JointPosterior
 from doe.studies.study import Factor
 from explorer.report.content import Spec
-from explorer.report.figures.model import FittedTarget
+from explorer.report.figures.model import FittedTarget, chosen_star, pair_panels
 from explorer.report.figures.style import (
     ASSUMPTION,
     CHOSEN,
@@ -24,11 +24,11 @@ from explorer.report.figures.style import (
     chart,
     label,
     line,
-    points,
+    rounded,
     side_by_side,
     suffix,
 )
-from explorer.report.figures.surface import GRID, section
+from explorer.report.figures.surface import GRID, section, sides
 from explorer.units import axis_title, observable_label, parameter_range, unit_of_parameter
 
 COLOURS = (TARGET, ASSUMPTION, FACTOR, DUMMY, CHOSEN)
@@ -43,54 +43,37 @@ def overlaid(targets: Sequence[FittedTarget]) -> Spec:
     Full line: the target; dotted: target ± margin; filled: every target within its margin.
     """
     first = targets[0]
-    factors, region = first.factors, first.model.region
-    pairs = list(combinations(range(len(factors)), 2))
-    domains = side_by_side(len(pairs), 0.1)
+    panels, layout = pair_panels(first)
     traces: list[Json] = []
-    layout: Json = {}
-    for panel, (i, j) in enumerate(pairs):
-        axes: Json = {"xaxis": f"x{suffix(panel)}", "yaxis": f"y{suffix(panel)}"}
-        sizes = [unit_of_parameter(factors[k].path).size for k in (i, j)]
-        x, y = (
-            ((region.centre[k] + region.half_width[k] * np.linspace(-1, 1, GRID)) / size).tolist()
-            for k, size in zip((i, j), sizes, strict=True)
-        )
-        missed = [_missed(one, i, j) for one in targets]
-        flat: Json = {"type": "contour", "x": x, "y": y, "showscale": False, "hoverinfo": "skip", **axes}
-        worst = np.abs(missed).max(axis=0).round(4).tolist()
+    for panel in panels:
+        x, y = sides(first, panel, GRID)
+        missed = [_missed(one, panel.pair) for one in targets]
+        flat: Json = {"type": "contour", "x": x, "y": y, "showscale": False, "hoverinfo": "skip", **panel.axes}
         # plotly shades where a constraint does not hold.
         inside = {"type": "constraint", "operation": ">", "value": 1.0}
         traces.append(
             flat
-            | {"z": worst, "contours": inside, "fillcolor": WITHIN, "line": {"width": 0}}
-            | {"name": "all within their margins", "showlegend": panel == 0}
+            | {"z": rounded(np.abs(missed).max(axis=0)), "contours": inside, "fillcolor": WITHIN, "line": {"width": 0}}
+            | {"name": "all within their margins", "showlegend": panel.in_legend}
         )
         for k, (one, grid) in enumerate(zip(targets, missed, strict=True)):
-            colour, z = COLOURS[k % len(COLOURS)], grid.round(4).tolist()
+            colour, z = COLOURS[k % len(COLOURS)], rounded(grid)
             name = label(observable_label(one.observable))
             for start, end, size, width, dash in ((0.0, 0.0, 1.0, 3, "solid"), (-1.0, 1.0, 2.0, 1.2, "dot")):
                 drawn = {"coloring": "none", "start": start, "end": end, "size": size}
                 traces.append(
                     flat
                     | {"z": z, "contours": drawn, "line": {"color": colour, "width": width, "dash": dash}}
-                    | {"name": name, "legendgroup": name, "showlegend": panel == 0 and dash == "solid"}
+                    | {"name": name, "legendgroup": name, "showlegend": panel.in_legend and dash == "solid"}
                 )
-        if first.chosen is not None:
-            at = np.array(first.chosen)[[i, j]] / sizes
-            star = {"size": 13, "symbol": "star", "line": {"color": "#ffffff", "width": 1}}
-            place = {"marker": star, "showlegend": panel == 0, **axes}
-            traces.append(points([float(at[0])], [float(at[1])], first.chosen_name, CHOSEN, **place))
-        layout[f"xaxis{suffix(panel)}"] = axis(
-            axis_title(factors[i].path, factors[i].name), domain=domains[panel], anchor=f"y{suffix(panel)}"
-        )
-        layout[f"yaxis{suffix(panel)}"] = axis(axis_title(factors[j].path, factors[j].name), anchor=f"x{suffix(panel)}")
+        traces += chosen_star(first, panel)
     return chart(traces, layout, 420)
 
 
-def _missed(one: FittedTarget, i: int, j: int) -> np.ndarray:
-    """(model − target)/margin on the section over factors i and j."""
+def _missed(one: FittedTarget, pair: tuple[int, int]) -> np.ndarray:
+    """(model − target)/margin on the section over a pair of factors."""
     assert one.target is not None
-    return (section(one, i, j, GRID) - one.target) / one.margin
+    return (section(one, pair, GRID) - one.target) / one.margin
 
 
 def corner(posterior: JointPosterior, factors: Sequence[Factor]) -> Spec:

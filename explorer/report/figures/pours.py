@@ -42,6 +42,7 @@ from explorer.units import (
     enumeration,
     observable_label,
     observable_title,
+    observed_number,
     parameter_label,
     parameter_value,
     unit_of_observable,
@@ -186,7 +187,7 @@ def ascent_path(walk: AscentResult, seen: TargetWalk, target: Target) -> Spec:
             line=line(FACTOR),
             error_y=error_bars(widths, FACTOR),
             text=settings,
-            hovertemplate="step %{x}: %{y:.2f}<br>%{text}<extra></extra>",
+            hovertemplate="step %{x}: %{y:.4g}<br>%{text}<extra></extra>",
         ),
     ]
     layout = {"xaxis": axis("step", dtick=1), "yaxis": axis(observable_title(seen.observable))}
@@ -322,10 +323,11 @@ def _single_runs(x: Sequence[float], rows: Sequence[Sequence[Run]], observable: 
 def _target_marks(target: Target) -> Json:
     unit = unit_of_observable(target.observable)
     mean, margin = unit.of(target.mean), unit.of(target.margin)
+    told = [observed_number(target.observable, value) for value in (target.mean, target.margin)]
     return {
         "shapes": [horizontal_band(mean - margin, mean + margin, MARGIN_BAND), horizontal_line(mean, TARGET)],
         "annotations": [
-            note(f"target {mean:.2f} ± margin {margin:.2f}", 0.995, mean, xanchor="right", yanchor="bottom")
+            note(f"target {told[0]} ± margin {told[1]}", 0.995, mean, xanchor="right", yanchor="bottom")
             | {"xref": "x domain", "yref": "y"}
         ],
     }

@@ -11,6 +11,9 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from explorer.report.content import Spec
 
 Json = dict[str, Any]
@@ -27,6 +30,8 @@ INTERVAL_BAND = "rgba(101, 110, 224, 0.22)"
 CLOUD = "rgba(101, 110, 224, 0.4)"
 BELOW_TO_ABOVE = [[0.0, FACTOR], [0.5, "#efece6"], [1.0, ASSUMPTION]]
 """Colour scale of a surface: below, at and above the target."""
+LEAST_SPREAD = 1e-9
+"""Spread relative to the largest number below which it is rounding."""
 
 
 CONFIG: Json = {
@@ -61,8 +66,8 @@ def chart(traces: list[Json], layout: Json, height: int = 380) -> Spec:
 
 
 def axis(title: str, **more: Any) -> Json:
-    """An axis with a title."""
-    return {"title": {"text": label(title)}, "automargin": True, **more}
+    """An axis with a title; very small and large numbers as powers of ten, by default they would be 20n and 1B."""
+    return {"title": {"text": label(title)}, "automargin": True, "exponentformat": "power", **more}
 
 
 def side_by_side(panels: int, gap: float = 0.06) -> list[list[float]]:
@@ -111,6 +116,14 @@ def short_rows(spec: Spec) -> Spec:
 def finite(values: Iterable[float]) -> list[float | None]:
     """Numbers for a chart: None, which leaves a gap, for one that is not there."""
     return [float(value) if math.isfinite(value) else None for value in values]
+
+
+def rounded(values: npt.NDArray[np.floating[Any]]) -> list[Any]:
+    """The numbers of a grid or a curve to at least a hundred-thousandth of their spread: short in a file, exact on any
+    screen, however small or large they are.
+    """
+    spread = max(float(np.ptp(values)), LEAST_SPREAD * float(np.abs(values).max()))
+    return np.round(values, 5 - math.floor(math.log10(spread)) if spread else 0).tolist()
 
 
 def suffix(panel: int) -> str:

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import combinations
 
 import numpy as np
 from scipy import stats
 
 from explorer.report.content import Spec
-from explorer.report.figures.model import Array, FittedTarget
+from explorer.report.figures.model import Array, FittedTarget, PairPanel, chosen_star, pair_panels
 from explorer.report.figures.style import (
     BELOW_TO_ABOVE,
     CHOSEN,
@@ -29,10 +28,10 @@ from explorer.report.figures.style import (
     label,
     line,
     points,
+    rounded,
     side_by_side,
-    suffix,
 )
-from explorer.units import axis_title, observable_title, unit_of_observable, unit_of_parameter
+from explorer.units import axis_title, counted, observable_title, unit_of_observable, unit_of_parameter
 
 GRID, SOLID_GRID, CUBE = 41, 25, 17
 """Points along each side of the grids: in a plane, of a height in space, of a body in space."""
@@ -44,22 +43,15 @@ def contours(fitted: FittedTarget) -> Spec:
     Runs of the design are projected on each panel; the thick line is where the model gives the target, where there is
     one.
     """
-    unit, factors, region = unit_of_observable(fitted.observable), fitted.factors, fitted.model.region
-    pairs = list(combinations(range(len(factors)), 2))
-    grids = [section(fitted, i, j, GRID) / unit.size for i, j in pairs]
+    unit = unit_of_observable(fitted.observable)
+    panels, axes = pair_panels(fitted)
+    grids = [section(fitted, panel.pair, GRID) / unit.size for panel in panels]
     level = float(np.mean(grids)) if fitted.target is None else unit.of(fitted.target)
     reach = max(float(np.abs(grid - level).max()) for grid in grids) or 1.0
-    domains = side_by_side(len(pairs), 0.1)
     traces: list[Json] = []
-    layout: Json = {"coloraxis": _colours(level, reach, observable_title(fitted.observable))}
-    for panel, (i, j) in enumerate(pairs):
-        axes = {"xaxis": f"x{suffix(panel)}", "yaxis": f"y{suffix(panel)}"}
-        scale = [unit_of_parameter(factors[k].path).size for k in (i, j)]
-        x, y = (
-            ((region.centre[k] + region.half_width[k] * np.linspace(-1, 1, GRID)) / size).tolist()
-            for k, size in zip((i, j), scale, strict=True)
-        )
-        shared: Json = {"type": "contour", "x": x, "y": y, "z": np.round(grids[panel], 6).tolist(), **axes}
+    for panel, grid in zip(panels, grids, strict=True):
+        x, y = sides(fitted, panel, GRID)
+        shared: Json = {"type": "contour", "x": x, "y": y, "z": rounded(grid), **panel.axes}
         traces.append(
             shared
             | {
@@ -67,53 +59,59 @@ def contours(fitted: FittedTarget) -> Spec:
                 "name": "model",
                 "line": {"width": 0.6, "color": "rgba(43, 47, 52, 0.35)"},
                 "contours": {"coloring": "heatmap", "showlabels": True, "labelfont": {"size": 10, "color": INK}},
-                "hovertemplate": "%{x:.4g}, %{y:.4g}: %{z:.2f}<extra></extra>",
+                "hovertemplate": "%{x:.4g}, %{y:.4g}: %{z:.4g}<extra></extra>",
             }
         )
         at_target = {"start": level, "end": level, "size": 1.0, "coloring": "none"}
         line_at_target = (
             shared
             | {"contours": at_target, "line": {"color": TARGET, "width": 4}, "showscale": False, "hoverinfo": "skip"}
-            | {"name": "model = target", "showlegend": panel == 0}
+            | {"name": "model = target", "showlegend": panel.in_legend}
         )
         traces += [] if fitted.target is None else [line_at_target]
-        traces += _marks(fitted, (i, j), scale, axes, panel == 0)
-        layout[f"xaxis{suffix(panel)}"] = axis(
-            axis_title(factors[i].path, factors[i].name), domain=domains[panel], anchor=f"y{suffix(panel)}"
-        )
-        layout[f"yaxis{suffix(panel)}"] = axis(axis_title(factors[j].path, factors[j].name), anchor=f"x{suffix(panel)}")
-    return chart(traces, layout, 420)
+        traces += _marks(fitted, panel)
+    return chart(traces, axes | {"coloraxis": _colours(level, reach, observable_title(fitted.observable))}, 420)
 
 
-def section(fitted: FittedTarget, i: int, j: int, side: int) -> Array:
-    """The model [SI] on a grid over factors i (columns), j (rows), ``side`` points each, the others at the section."""
+def sides(fitted: FittedTarget, panel: PairPanel, points_along: int) -> tuple[list[float], list[float]]:
+    """Places along both sides of a panel, from end to end of the region, in the units of the screen."""
+    region, coded = fitted.model.region, np.linspace(-1.0, 1.0, points_along)
+    x, y = (
+        ((region.centre[k] + region.half_width[k] * coded) / size).tolist()
+        for k, size in zip(panel.pair, panel.sizes, strict=True)
+    )
+    return x, y
+
+
+def section(fitted: FittedTarget, pair: tuple[int, int], side: int) -> Array:
+    """The model [SI] on a grid over a pair of factors, the first along the columns, ``side`` points each, the others at
+    the section.
+    """
+    i, j = pair
     fixed = fitted.model.region.coded(fitted.section_point)
     coded = np.broadcast_to(fixed, (side, side, fixed.size)).copy()
     coded[..., i], coded[..., j] = np.meshgrid(np.linspace(-1, 1, side), np.linspace(-1, 1, side))
     return fitted.model.predict(coded)
 
 
-def _marks(fitted: FittedTarget, pair: tuple[int, int], scale: list[float], axes: Json, in_legend: bool) -> list[Json]:
+def _marks(fitted: FittedTarget, panel: PairPanel) -> list[Json]:
     """Runs of the design, the measured parameters where they lie in the region, and the optimum if there is one."""
-    natural = fitted.design[:, pair] / scale
-    reference = np.array([float(fitted.factors[k].reference) for k in pair]) / scale
-    low, high = fitted.low[list(pair)] / scale, fitted.high[list(pair)] / scale
+    pair, sizes = list(panel.pair), np.array(panel.sizes)
+    natural = fitted.design[:, pair] / sizes
+    reference = np.array([float(fitted.factors[k].reference) for k in pair]) / sizes
+    low, high = fitted.low[pair] / sizes, fitted.high[pair] / sizes
     runs = {"size": 7, "color": "#ffffff", "line": {"color": INK, "width": 1.2}}
-    star = {"size": 13, "symbol": "star", "line": {"color": "#ffffff", "width": 1}}
     diamond = {"size": 10, "symbol": "diamond", "color": "#ffffff", "line": {"color": INK, "width": 1.5}}
-    shown: Json = {"showlegend": in_legend, **axes}
+    shown: Json = panel.axes | {"showlegend": panel.in_legend}
     marks = [points(natural[:, 0].tolist(), natural[:, 1].tolist(), "points of the design", INK, marker=runs, **shown)]
     if ((low <= reference) & (reference <= high)).all():
         x, y = (float(value) for value in reference)
         marks.append(points([x], [y], fitted.reference_name, INK, marker=diamond, **shown))
-    if fitted.chosen is None:
-        return marks
-    at = np.array(fitted.chosen)[list(pair)] / scale
-    return [*marks, points([float(at[0])], [float(at[1])], fitted.chosen_name, CHOSEN, marker=star, **shown)]
+    return [*marks, *chosen_star(fitted, panel)]
 
 
 def _colours(level: float, reach: float, title: str) -> Json:
-    bar = {"title": {"text": title, "side": "right"}, "thickness": 12, "outlinewidth": 0}
+    bar = {"title": {"text": title, "side": "right"}, "thickness": 12, "outlinewidth": 0, "exponentformat": "power"}
     return {"colorscale": BELOW_TO_ABOVE, "cmin": level - reach, "cmax": level + reach, "colorbar": bar}
 
 
@@ -160,7 +158,7 @@ def residual_quantiles(fitted: FittedTarget) -> Spec:
         points(wanted, known, "runs of the design", FACTOR, marker={"opacity": 0.75}),
     ]
     layout = {
-        "xaxis": axis(f"quantile of t ({max(1, df - 1)} degrees of freedom)"),
+        "xaxis": axis(f"quantile of t ({counted(max(1, df - 1), 'degree of freedom')})"),
         "yaxis": axis("studentized residual"),
     }
     return chart(traces, layout, 380)
@@ -170,17 +168,17 @@ def height_over(fitted: FittedTarget, pair: tuple[int, int]) -> Spec:
     """The model over two factors, the others at the optimum, with the observed runs above it."""
     model, region, unit, (i, j) = fitted.model, fitted.model.region, unit_of_observable(fitted.observable), pair
     sides = np.linspace(-1.0, 1.0, SOLID_GRID)
-    heights = section(fitted, i, j, SOLID_GRID) / unit.size
+    heights = section(fitted, pair, SOLID_GRID) / unit.size
     level = float(heights.mean()) if fitted.target is None else unit.of(fitted.target)
-    reach = max(float(np.abs(heights - level).max()), 1e-9)
+    reach = float(np.abs(heights - level).max()) or 1.0
     sizes = [unit_of_parameter(fitted.factors[k].path).size for k in pair]
     x, y = (((region.centre[k] + region.half_width[k] * sides) / s).tolist() for k, s in zip(pair, sizes, strict=True))
     at = region.natural(model.points)
     traces: list[Json] = [
-        {"type": "surface", "x": x, "y": y, "z": heights.round(5).tolist(), "colorscale": BELOW_TO_ABOVE}
+        {"type": "surface", "x": x, "y": y, "z": rounded(heights), "colorscale": BELOW_TO_ABOVE}
         | {"cmin": level - reach, "cmax": level + reach, "showscale": False, "opacity": 0.85, "name": "model"}
         | {"contours": {"z": {"show": True, "start": level, "end": level, "size": 1, "color": TARGET, "width": 6}}}
-        | {"hovertemplate": "%{x:.4g}, %{y:.4g}: %{z:.2f}<extra>model</extra>"},
+        | {"hovertemplate": "%{x:.4g}, %{y:.4g}: %{z:.4g}<extra>model</extra>"},
         _dots(
             [
                 (at[:, i] / sizes[0]).tolist(),
@@ -212,7 +210,7 @@ def solutions(fitted: FittedTarget) -> Spec | None:
     coded = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
     sizes = np.array([unit_of_parameter(factor.path).size for factor in factors])
     x, y, z = (fitted.model.region.natural(coded) / sizes).T
-    heights = fitted.model.predict(coded).round(6).tolist()
+    heights = rounded(fitted.model.predict(coded))
     same = {
         "isomin": target,
         "isomax": target,

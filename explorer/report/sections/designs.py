@@ -19,8 +19,10 @@ from explorer.report.figures.pours import scan as scan_chart
 from explorer.units import (
     MISSING,
     code,
+    counted,
     enumeration,
     fixed,
+    number,
     observable_label,
     observable_title,
     observed,
@@ -178,8 +180,9 @@ def screening(result: StudyResult) -> Section:
     analysis = part.analysis
     blocks: list[Block] = [
         Text(
-            f"{analysis.rows}-run {result.study.designs['screening']} design over {len(part.factors)} factors, "
-            f"{analysis.runs} valid pours, response: {observable_label(part.response)}."
+            f"{analysis.rows}-run {result.study.designs['screening']} design over "
+            f"{counted(len(part.factors), 'factor')}, {analysis.runs} valid pours, response: "
+            f"{observable_label(part.response)}."
         ),
         Facts(tuple(_verdicts(part))),
     ]
@@ -213,7 +216,8 @@ def not_testable(part: ScreeningResult) -> list[Block]:
     if not part.not_testable:
         return []
     names = tuple(
-        f"{entry.factor.replace('_', ' ')} ({parameter_label(entry.path)}): acts on {entry.bodies:.0f} bodies"
+        f"{entry.factor.replace('_', ' ')} ({parameter_label(entry.path)}): acts on {entry.bodies:.0f} "
+        f"{'body' if round(entry.bodies) == 1 else 'bodies'}"
         for entry in part.not_testable
     )
     return [Text(f"Not testable, because they touch fewer than {MIN_BODIES} bodies of the mixture:"), Bullets(names)]
@@ -240,7 +244,7 @@ def effect_table(part: ScreeningResult) -> Table:
                 MISSING if by_replicates is None else p_value(by_replicates.p),
                 MISSING if by_dummies is None else p_value(by_dummies.p),
                 MISSING if deciding is None else p_value(deciding.p_holm),
-                fixed(effect.sum_of_squares / size**2),
+                number(effect.sum_of_squares / size**2, 4),
                 fixed(effect.contribution_percent, 1),
                 with_sign(observed_number(part.response, in_target[effect.name].effect)),
             )
@@ -305,7 +309,7 @@ def _verdicts(part: ScreeningResult) -> list[tuple[str, str]]:
             found.append((way, "not available"))
             continue
         raw, corrected = (enumeration(analysis.significant(adjust=one, error=name)) for one in ADJUSTMENTS)
-        found.append((way, f"p < 0.05: {raw}; after Holm: {corrected} ({error.df} degrees of freedom)"))
+        found.append((way, f"p < 0.05: {raw}; after Holm: {corrected} ({counted(error.df, 'degree of freedom')})"))
         found.append(
             (
                 f"Limits against the {name}",

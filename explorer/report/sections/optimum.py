@@ -44,25 +44,33 @@ def optimum(result: StudyResult) -> Section:
     if found.posterior is not None:
         blocks += _posterior(result, found.posterior)
     blocks += [
-        Figure("ranges", ranges(first), ranges_caption(found)),
+        Figure(
+            "ranges", ranges(first), ranges_caption(found, f"n = {_readings(result)} readings of the design's runs")
+        ),
         Figure(
             "cloud",
             cloud(first),
             f"n = {len(single.bootstrap_points)} refits to resampled {single.resampling} (bootstrap); each dot is the "
             "solution "
             f"nearest the measured parameters. {percent(single.share_reached)} of the refits reach the target. "
-            f"{cloud_caution(found) if found.compromise is None else REFITS_ALONE}".rstrip(),
+            f"{cloud_caution(found)}".rstrip(),
         ),
     ]
     return Section("Optimum", tuple(blocks))
 
 
-def ranges_caption(found: OptimumResult) -> str:
-    """What the bars of the ranges are."""
-    return (
-        "The narrower a bar, the better a factor is known: wide, the region of the surface; middle, where the fitted "
-        f"model gives the target; narrow, the 95 % set over n = {len(found.single.bootstrap_points)} bootstrap refits."
-    )
+def ranges_caption(found: OptimumResult, n: str) -> str:
+    """What the bars of the ranges are; ``n``: of what, how many, the model was fitted to."""
+    single, several = found.single, found.compromise is not None
+    bars = ["wide, the region of the surface"]
+    if several and found.posterior is not None:
+        bars.append("narrow, the 95 % interval of the posterior by all targets")
+    else:
+        if single.reached:
+            bars.append(f"middle, where the fitted model gives the {'first target' if several else 'target'}")
+        if any(one.identified for one in found.estimates.values()):
+            bars.append(f"narrow, the 95 % set over n = {len(single.bootstrap_points)} bootstrap refits")
+    return f"{n}. The narrower a bar, the better a factor is known: {'; '.join(bars)}."
 
 
 def _statement(result: StudyResult) -> str:
@@ -127,7 +135,6 @@ def _settings(result: StudyResult, reference_name: str) -> Table:
 
 JOINT = "Ranges are 95 % intervals of what all targets say together."
 FIRST_ALONE = "Intervals and ranges of the first target alone."
-REFITS_ALONE = "The refits are of the first target alone, the star is the setting of all targets."
 
 
 def _compromise(result: StudyResult, compromise: Compromise) -> list[Block]:

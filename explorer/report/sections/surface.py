@@ -22,6 +22,7 @@ from explorer.report.figures.model import FittedTarget, fitted_targets
 from explorer.report.figures.pours import ascent_path
 from explorer.report.figures.surface import contours, fit
 from explorer.units import (
+    counted,
     enumeration,
     fixed,
     number,
@@ -121,8 +122,8 @@ def surface(result: StudyResult) -> Section:
     blocks: list[Block] = [
         Text(
             f"{name[0].upper()}{name[1:]} design of {len(part.design)} points over "
-            f"{len(part.factors)} factors, and the full second-order model by least squares on every valid pour. The "
-            "first model sees a change of "
+            f"{counted(len(part.factors), 'factor')}, and the full second-order model by least squares on every valid "
+            "pour. The first model sees a change of "
             f"{observed(part.observables[0], part.smallest_main_effect[0])} from the low to the high end of a factor "
             "with chance 0.8."
         ),
@@ -180,7 +181,7 @@ def _of_target(place: int, fitted: FittedTarget, canonical: Canonical) -> list[B
                        f"{fixed(anova.r_squared_predicted, 3)}, by whole points "
                        f"{fixed(anova.r_squared_predicted_by_row, 3)}"),
                 ("Scatter", f"σ = {observed(observable, anova.sigma)}, coefficient of variation "
-                            f"{fixed(anova.cv_percent)} %"),
+                            f"{percent(anova.cv_percent / 100, 2)}"),
                 ("Adequate precision", fixed(anova.adequate_precision)),
                 ("Shape", _shape(canonical)),
                 ("Equation, coded", f"{coded} (each factor from −1 to +1 over the region)"),

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 from explorer.background.command_process import CommandStatus
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.project.steps import Room
-from explorer.report.content import Table
+from explorer.report.content import Banner, Table
 from explorer.report.diagnosis.answer import banner
 from explorer.report.diagnosis.charts import diagnosis_plots, likely, map_chart
 from explorer.report.diagnosis.wording import chance, feature_label, feature_value, spelled
@@ -26,8 +27,13 @@ CORRECTED_ACTS = (
 )
 
 
-def diagnosis_board(result: DiagnosisResult | None, status: CommandStatus | None, report: str = "") -> Board:
-    """The board of ``result``; ``status`` of the process that works, None where none does."""
+def diagnosis_board(
+    result: DiagnosisResult | None, status: CommandStatus | None, report: str = "", on_page: bool = True
+) -> Board:
+    """The board of ``result``; ``status`` of the process that works, None where none does.
+
+    ``on_page``: it stands in a page whose buttons do what comes next, and not alone.
+    """
     alive = status is not None and status.alive
     subtitle = working(status) if status is not None and alive else ""
     if result is None:
@@ -44,7 +50,7 @@ def diagnosis_board(result: DiagnosisResult | None, status: CommandStatus | None
     return Board(
         title=result.data.title or result.data.folder,
         subtitle=subtitle,
-        banner=banner(result),
+        banner=_pressed(result) if on_page else banner(result),
         acts=(
             SIDE_BY_SIDE_ACT,
             *(CORRECTED_ACTS if result.added else ()),
@@ -55,6 +61,13 @@ def diagnosis_board(result: DiagnosisResult | None, status: CommandStatus | None
         tables=(_answers(result), _errors(result)),
         report=report,
     )
+
+
+def _pressed(result: DiagnosisResult) -> Banner:
+    """The verdict; what comes next by the buttons below it where there are any, and not by commands."""
+    further = ["What else is missing beside it?"] if result.handed_on() else []
+    then = " ".join(["Pour the corrected model, and calibrate it.", *further])
+    return replace(banner(result), then=then) if result.added else banner(result)
 
 
 def _answers(result: DiagnosisResult) -> BoardTable:

@@ -48,7 +48,7 @@ class FolderBoard:
         report = published_report(self._pages, self._folder)
         try:
             if diagnosis is not None:
-                board = diagnosis_board(DiagnosisResult.from_dict(diagnosis), None, report)
+                board = diagnosis_board(DiagnosisResult.from_dict(diagnosis), None, report, on_page=False)
             else:
                 board = study_board(
                     None if study is None else study_from(study),

@@ -7,7 +7,7 @@ from explorer.design.analysis import AnalyseOrder
 from explorer.design.choices import ModelOrder, Reduction, Surrogate
 from explorer.laboratory.command_results import analysis_result
 from explorer.viewer.laboratory.answer_view import AnswerView
-from explorer.viewer.laboratory.inputs import UploadSlot, number_or_none, parts_of
+from explorer.viewer.laboratory.inputs import UploadSlot, in_labels, number_or_none, parts_of
 from explorer.viewer.panel import LABORATORY, PageContext, Panel
 from explorer.viewer.tables.sheet_page import sheet_page
 from explorer.viewer.tables.table_server import link_html
@@ -24,6 +24,22 @@ REDUCTIONS = {
 """Choice → rule by which terms are dropped."""
 FILL_IN = "Fill in this sheet in a table"
 NO_FACTORS = "as the sheet says"
+LABELS = {
+    "--response NAME": "Response",
+    "--response": "Response",
+    "--target": "Target",
+    "--target-error": "Standard error of the target",
+    "--block": "Block",
+    "--random": "Groups at random",
+    "--model": "Model",
+    "--terms": "Terms",
+    "--reduce": "Drop terms",
+    "--surrogate gp": "Gaussian process beside it",
+    "--only": "Only",
+    "--factors FILE": "Factors of the sheet",
+    "--factors": "Factors of the sheet",
+}
+"""Option of the command line → label of its field."""
 
 
 class AnalysisPanel(Panel):
@@ -97,4 +113,4 @@ class AnalysisPanel(Panel):
             reduction=REDUCTIONS.get(str(self._reduce.value)),
             surrogate=Surrogate.GP if self._surrogate.value else None,
         )
-        self._background.start("analysing the sheet", lambda: analysis_result(order), self.view.show)
+        self._background.start("analysing the sheet", in_labels(lambda: analysis_result(order), LABELS), self.view.show)

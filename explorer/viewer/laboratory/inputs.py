@@ -5,17 +5,16 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import viser
 
 from explorer.errors import CommandError
 from explorer.files.uploads import kept_file
+from explorer.laboratory.command_results import CommandResult
 from explorer.viewer.actions import Post, on_upload
-
-OPTION = re.compile(r"--[a-z][a-z-]*")
-Found = TypeVar("Found")
 
 
 class UploadSlot:
@@ -103,7 +102,8 @@ def number_or_none(text: str, what: str) -> float | None:
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise CommandError(f"{what} {text.strip()[:40]!r}: allowed is a number, or nothing")
+        point = " with a decimal point" if "," in text else ""
+        raise CommandError(f"{what} {text.strip()[:40]!r}: allowed is a number{point}, or nothing")
     return number
 
 
@@ -118,14 +118,23 @@ def whole_or_none(text: str, what: str, least: int, most: int | None) -> int | N
     return int(number)
 
 
-def in_labels(work: Callable[[], Found], labels: Mapping[str, str]) -> Callable[[], Found]:
-    """``work`` whose refusals name the page's ``labels`` in place of the command line's options."""
+def in_labels(work: Callable[[], CommandResult], labels: Mapping[str, str]) -> Callable[[], CommandResult]:
+    """``work`` whose answer and refusals name the page's ``labels`` in place of the command line's options.
 
-    def done() -> Found:
+    A key of ``labels`` may hold a value too, as "--surrogate gp" does. The line that repeats the answer stays as it is.
+    """
+    longest_first = sorted(labels, key=len, reverse=True)
+    option = re.compile(rf"(?:{'|'.join(map(re.escape, longest_first))})(?![\w-])")
+
+    def named(text: str) -> str:
+        return option.sub(lambda found: labels[found[0]], text)
+
+    def done() -> CommandResult:
         try:
-            return work()
+            answer = work()
         except ValueError as error:
-            raise CommandError(OPTION.sub(lambda option: labels.get(option[0], option[0]), str(error))) from error
+            raise CommandError(named(str(error))) from error
+        return replace(answer, text=named(answer.text), note=named(answer.note))
 
     return done
 

@@ -11,7 +11,7 @@ import viser
 
 from explorer.background.command_output import command_output, kept_scene
 from explorer.errors import CommandError
-from explorer.export import OWN, names
+from explorer.export import EXPORTS, OWN, names
 from explorer.files.exports import zipped
 from explorer.viewer.output.send_file import send_file
 from explorer.viewer.panel import EXPORT, PageContext, Panel
@@ -59,12 +59,13 @@ def programs_text() -> str:
 
 
 def packed_export(scene: Path, program: str, seed: int) -> bytes:
-    """A .zip of the folder that ``explorer export scene DIR --to program --seed seed`` makes, in a process of its own.
+    """A .zip of the folder that ``explorer export scene DIR --to program`` makes, in a process of its own.
 
-    Raises CommandError where that command refuses.
+    ``seed`` is that of the pour, for programs that get one. Raises CommandError where that command refuses.
     """
     with tempfile.TemporaryDirectory() as apart:
         folder = Path(apart) / f"{scene.stem}_{program}"
-        command_output(["export", str(scene), str(folder), "--to", program, "--seed", str(seed)])
+        of_pour = [] if EXPORTS[program].of_material else ["--seed", str(seed)]
+        command_output(["export", str(scene), str(folder), "--to", program, *of_pour])
         written = sorted(one for one in folder.rglob("*") if one.is_file())
         return zipped({str(path.relative_to(apart)): path for path in written})

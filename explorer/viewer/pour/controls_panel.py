@@ -11,6 +11,7 @@ from typing import Any
 
 from explorer.live.messages import Status
 from explorer.viewer.actions import add_keys, button_group
+from explorer.viewer.number_box import with_decimals
 from explorer.viewer.panel import CONTROLS, PageContext
 from explorer.viewer.pour.live_sliders import LiveControl, control_for, screen_range, titled
 from explorer.viewer.pour.rebuilt_panel import RebuiltPanel
@@ -57,12 +58,14 @@ class Controls:
         self._feed = None
         if FEED_RATE in known:
             low, high = screen_range(known[FEED_RATE])
-            self._feed = gui.add_number(
-                titled(known[FEED_RATE], "Feed rate"),
-                on_screen(known[FEED_RATE], scene),
-                min=low,
-                max=high,
-                hint=f"Acts on the next pour. {known[FEED_RATE].doc}",
+            self._feed = with_decimals(
+                gui.add_number(
+                    titled(known[FEED_RATE], "Feed rate"),
+                    on_screen(known[FEED_RATE], scene),
+                    min=low,
+                    max=high,
+                    hint=f"Acts on the next pour. {known[FEED_RATE].doc}",
+                )
             )
         button_group(
             gui,
@@ -83,7 +86,7 @@ class Controls:
     def show(self, status: Status) -> None:
         """Follow the solver's values, and the feed of a pour that was begun elsewhere."""
         if self._feed is not None and status.generation != self._generation:
-            self._feed.value = on_screen(parameters(status.scene)[FEED_RATE], status.scene)  # type: ignore[misc]
+            self._feed.value = on_screen(parameters(status.scene)[FEED_RATE], status.scene)
         self._generation = status.generation
         if not all(control.fits(status.scene) for control in self._live):
             self._build(status.scene)

@@ -14,6 +14,7 @@ from explorer.errors import CommandError
 from explorer.live.frames import Frame
 from explorer.units import checked
 from explorer.viewer.actions import button_group
+from explorer.viewer.number_box import with_decimals
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.view import small_html
 from solver.pours.disturbance import PlateMotion, Pull, Shake, Tap
@@ -43,14 +44,14 @@ class DisturbPanel(Panel):
         self._text = gui.add_html("")
         with gui.add_folder("How far, how fast, how hard", expand_by_default=False):
             self._up = gui.add_number("Tap: up [mm]", 1.0, min=0.001, max=20.0, hint="u(t) = up · sin²(π t/time)")
-            self._time = gui.add_number("Tap: time [ms]", 30.0, min=1.0, max=1000.0)
+            self._time = with_decimals(gui.add_number("Tap: time [ms]", 30.0, min=1.0, max=1000.0))
             self._to = gui.add_number("Shake: ± [mm]", 1.5, min=0.001, max=20.0, hint="u(t) = ± sin(2π f t), along x")
-            self._hertz = gui.add_number("Shake: f [Hz]", 15.0, min=0.5, max=200.0)
+            self._hertz = with_decimals(gui.add_number("Shake: f [Hz]", 15.0, min=0.5, max=200.0))
             self._periods = gui.add_number("Shake: periods", 10, min=1, max=1000, step=1)
             self._body = gui.add_number(
                 "Pull: body", TOPMOST, min=TOPMOST, step=1, hint="Number as in Look; 0: the one on top of the pile."
             )
-            self._force = gui.add_number("Pull: force [mN]", 2.0, min=0.0, max=LARGEST_FORCE)
+            self._force = with_decimals(gui.add_number("Pull: force [mN]", 2.0, min=0.0, max=LARGEST_FORCE))
             self._direction = gui.add_dropdown("Pull: direction", tuple(DIRECTIONS))
 
     def show(self, now: Now) -> None:

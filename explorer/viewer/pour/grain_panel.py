@@ -15,6 +15,7 @@ from explorer.scene.source import SceneSource, material_source
 from explorer.scene.starter_files import check_name, starter_scene
 from explorer.shape import LARGEST_EXTENT, LEAST_EXTENT
 from explorer.units import checked, screen_unit
+from explorer.viewer.number_box import with_decimals
 from explorer.viewer.panel import SET_UP, PageContext, Panel
 from explorer.viewer.view import small_html
 from solver import parameters, value
@@ -50,8 +51,10 @@ class GrainPanel(Panel):
             for name, size in usual.items()
         }
         self._numbers = {
-            path: gui.add_number(
-                title, value(starter, path), min=self._declared[path].low, max=self._declared[path].high, hint=hint
+            path: with_decimals(
+                gui.add_number(
+                    title, value(starter, path), min=self._declared[path].low, max=self._declared[path].high, hint=hint
+                )
             )
             for path, title, hint in (
                 (DENSITY, f"Density [{screen_unit(self._declared[DENSITY]).symbol}]", "Of one grain, not of the bulk."),

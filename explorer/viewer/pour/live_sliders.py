@@ -16,6 +16,7 @@ import viser
 
 from explorer.units import checked, screen_unit, title
 from explorer.viewer.actions import Post
+from explorer.viewer.number_box import with_decimals
 from solver.params import Parameter
 from solver.scenes.scene import Scene, value
 
@@ -160,9 +161,8 @@ def linear_faces(gui: viser.GuiApi, parameter: Parameter, start: float, label: s
 
 
 def log_faces(gui: viser.GuiApi, parameter: Parameter, start: float, label: str = "") -> tuple[Face, ...]:
-    """A number box in the unit of the screen, and below it a slider over its power of ten.
-
-    With a ``label`` the slider alone, in one row of the narrow panel.
+    """A number box in the unit of the screen, called ``label`` or as the parameter is, and below it a slider over its
+    power of ten.
     """
     name, (low, high) = titled(parameter, label), screen_range(parameter)
     unit = screen_unit(parameter).symbol
@@ -171,9 +171,9 @@ def log_faces(gui: viser.GuiApi, parameter: Parameter, start: float, label: str 
     def power_of(number: float) -> float:
         return min(max(round(math.log10(number), POWER_DIGITS), bottom), top)
 
-    box = None if label else gui.add_number(name, start, min=low, max=high, hint=parameter.doc)
+    box = with_decimals(gui.add_number(name, start, min=low, max=high, hint=parameter.doc))
     slider = gui.add_slider(
-        f"{label} [log {unit}]" if label else f"log₁₀ of {unit or name}",
+        f"log₁₀ {unit or name}",
         float(bottom),
         float(top),
         LINEAR_STEP,
@@ -185,10 +185,8 @@ def log_faces(gui: viser.GuiApi, parameter: Parameter, start: float, label: str 
     def number_from(power: object) -> float:
         return min(max(10.0 ** checked(power, bottom, top, name), low), high)
 
-    power = Face(slider, power_of, number_from)
-    if box is None:
-        return (power,)
-    return Face(box, lambda number: number, lambda entered: checked(entered, low, high, name)), power
+    read = Face(box, lambda number: number, lambda entered: checked(entered, low, high, name))
+    return read, Face(slider, power_of, number_from)
 
 
 def titled(parameter: Parameter, label: str) -> str:

@@ -7,7 +7,7 @@ import math
 from explorer.live.messages import SessionState, Status
 from explorer.outcomes import OUTCOME_SENTENCES
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
-from explorer.viewer.pour.readout import PHASE_WORDS
+from explorer.viewer.pour.readout import PHASE_WORDS, pace
 
 STYLE = """<style>
 .readings .grid {display: grid; grid-template-columns: 1fr 1fr; column-gap: 1.6em; margin-top: 0.3em;}
@@ -54,10 +54,10 @@ def readings(status: Status) -> list[tuple[str, str]]:
 def long_readings(status: Status) -> list[tuple[str, str]]:
     """Names and texts of the readings that take a line each."""
     starting, running = status.state == SessionState.STARTING, status.state == SessionState.RUNNING
-    pace = f"{status.real_time_factor:.2f} of {status.speed:.3g} wanted" if running else "–"
+    real_time = f"{pace(status)} of {status.speed:.3g} wanted" if running else "–"
     mass = f"{1e3 * status.discharged_mass:.1f} of {1e3 * status.poured_mass:.1f} g"
     found = [
-        ("Real-time factor", pace),
+        ("Real-time factor", real_time),
         ("Time step", "–" if starting else time_step_text(status)),
         ("Outcome", "–" if starting else OUTCOME_SENTENCES[status.outcome]),
         ("Mass below the outlet", "–" if starting else mass),

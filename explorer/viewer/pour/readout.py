@@ -121,6 +121,12 @@ def condition(status: Status) -> str:
     return OUTCOME_WORDS.get(status.outcome, SLOWER if status.capped else "")
 
 
+def pace(status: Status) -> str:
+    """Simulated seconds per second, such as "0.42"; of a slow pour one digit, as "0.00" would say that it stands."""
+    factor = status.real_time_factor
+    return f"{factor:.2f}" if factor >= 0.1 else f"{factor:.1g}"
+
+
 def not_later(events: Iterable[Event], status: Status) -> list[Event]:
     """Events without those of the present pour that, since it was brought back, have not happened yet."""
     return [event for event in events if event.generation != status.generation or event.time <= status.time]

@@ -10,6 +10,7 @@ from explorer.live.messages import Status
 from explorer.live.session import Session
 from explorer.units import checked, screen_unit, title
 from explorer.viewer.actions import Post
+from explorer.viewer.number_box import with_decimals
 from explorer.viewer.panel import SET_UP
 from explorer.viewer.pour.rebuilt_panel import RebuiltPanel
 from solver.effects import set_up_effects
@@ -140,13 +141,15 @@ def parameter_input(gui: viser.GuiApi, parameter: Parameter, scene: Scene) -> An
         offered = options(parameter, present)
         return gui.add_dropdown(label(parameter), offered, initial_value=present, hint=parameter.doc)
     unit = screen_unit(parameter)
-    return gui.add_number(
-        label(parameter),
-        present,
-        min=unit.to_screen(parameter.low),
-        max=unit.to_screen(parameter.high),
-        step=SIGNIFICANT_STEP.get(unit.symbol),
-        hint=parameter.doc,
+    return with_decimals(
+        gui.add_number(
+            label(parameter),
+            present,
+            min=unit.to_screen(parameter.low),
+            max=unit.to_screen(parameter.high),
+            step=SIGNIFICANT_STEP.get(unit.symbol),
+            hint=parameter.doc,
+        )
     )
 
 

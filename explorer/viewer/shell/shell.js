@@ -98,7 +98,7 @@ const WAYS = [
   ["I have a grain and a photograph", "On the left, read the angle off a photograph of your pile and make it the " +
     "target. On the right, give the grain's shape and sizes and pour it; its file, once kept, is calibrated against it.",
     ["Set-up", "A grain of your own"], ["Laboratory", "Photograph"]],
-  ["Just play", "Watch a pile of sunflower seeds form, and move its friction, stiffness and restitution.", ["Controls"]],
+  ["Just play", "Watch a pile form, and move its friction, stiffness and restitution.", ["Controls"]],
   ["Plan an experiment", "A screening or response-surface design as a sheet to fill in, with its power told before you " +
     "measure.", ["Laboratory", "Your own design"]],
   ["Let a hidden effect be found", "Measured data of trefoil bodies with an effect that their model lacks: start the " +
@@ -160,7 +160,7 @@ function showTimeline(now) {
     mark.style.left = `${100 * (one.time - now.earliest) / span}%`;
     return mark;
   }));
-  lastEvent.textContent = now.notice || (now.events.length ? now.events[now.events.length - 1].text : "");
+  lastEvent.textContent = now.notice || now.busy || (now.events.length ? now.events[now.events.length - 1].text : "");
   lastEvent.classList.toggle("notice", Boolean(now.notice));
   lastEvent.title = lastEvent.textContent;
   if (speed.dataset.choices !== String(now.speeds)) {

@@ -11,7 +11,7 @@ from explorer.live.messages import SessionState
 from explorer.units import checked
 from explorer.viewer.actions import add_keys
 from explorer.viewer.panel import AROUND, Now, PageContext, Panel
-from explorer.viewer.pour.readout import PHASE_WORDS, STATE_WORDS, TROUBLE, condition
+from explorer.viewer.pour.readout import PHASE_WORDS, STATE_WORDS, TROUBLE, condition, pace
 
 PLAY_PAUSE, BACK, STEP = "Play / pause (space)", "◀ Back (←)", "Step ▶ (→)"
 KEYS: dict[str, Any] = {PLAY_PAUSE: "space", BACK: "arrowleft", STEP: "arrowright"}
@@ -45,7 +45,9 @@ class Timeline(Panel):
 
     def show(self, now: Now) -> None:
         """Tell the browsers where the pour is."""
-        self._page.channel.tell("timeline", timeline_state(now, self._page.recording.state.words))
+        page = self._page
+        busy = page.bench_work.busy_with or page.background.busy_with
+        page.channel.tell("timeline", timeline_state(now, page.recording.state.words, busy))
 
     def _toggle(self) -> None:
         if self._session.status().state in MOVING:
@@ -65,8 +67,10 @@ class Timeline(Panel):
         self._session.set_speed(checked(factor, SLOWEST, FASTEST, "speed"))
 
 
-def timeline_state(now: Now, recording: str) -> Mapping[str, Any]:
-    """What the timeline shows; ``recording``: what is recorded, in a few words, empty if nothing is."""
+def timeline_state(now: Now, recording: str, busy: str = "") -> Mapping[str, Any]:
+    """What the timeline shows; ``recording``: what is recorded, in a few words, empty if nothing is; ``busy``: likewise
+    what is being done beside the pour.
+    """
     status = now.status
     earliest = status.earliest if math.isfinite(status.earliest) else 0.0
     mine = [event for event in now.events if event.generation == status.generation and event.time <= status.time]
@@ -81,6 +85,7 @@ def timeline_state(now: Now, recording: str) -> Mapping[str, Any]:
         "trouble": status.state in TROUBLE,
         "recording": recording,
         "notice": now.notice[:LONGEST_NOTICE],
+        "busy": f"Busy {busy} …" if busy else "",
         "events": [{"time": event.time, "text": event.text[:LONGEST_EVENT]} for event in mine[-MOST_EVENTS:]],
     }
 
@@ -94,5 +99,5 @@ def condition_words(now: Now) -> str:
     if word := condition(status):
         words.append(word)
     if status.state == SessionState.RUNNING:
-        words.append(f"{status.real_time_factor:.2f} × real time")
+        words.append(f"{pace(status)} × real time")
     return " · ".join(words)

@@ -15,10 +15,11 @@ from explorer.report.comparison import comparison
 from explorer.report.content import Table
 from explorer.viewer.actions import Post
 from explorer.viewer.study.process_view import escaped
-from explorer.viewer.study.result_chooser import ResultChooser, title
+from explorer.viewer.study.result_chooser import ResultChooser, titles
 
 NONE = "(choose a finished study)"
 EMPTY = "Choose a second finished study: optimum, intervals and effects are then shown beside those of the one above."
+THE_SAME = "This is the study above: choose another one."
 NOT_YET = "The study above is not finished; a comparison needs two results."
 
 
@@ -30,17 +31,18 @@ class ComparisonPanel:
         self._chooser = ResultChooser(server, "Compare with", NONE, "result.json", post, self._draw)
         self._words = server.gui.add_markdown(EMPTY)
         self._result: AnyStudy | None = None
-        self._name = ""
+        self._folder: Path | None = None
         self._version: Hashable = None
 
     def offer(self, folders: Sequence[Path]) -> None:
         """The finished studies that there are now."""
         self._chooser.offer(folders)
 
-    def show(self, result: AnyStudy | None, name: str, version: Hashable) -> None:
-        """Follow the result that the page shows, called ``name``."""
-        if (version, name) != self._version:
-            self._version, self._result, self._name = (version, name), result, name
+    def show(self, result: AnyStudy | None, folder: Path | None, version: Hashable) -> None:
+        """Follow the result that the page shows, which is in ``folder``."""
+        shown = None if folder is None else folder.absolute()
+        if (version, shown) != self._version:
+            self._version, self._result, self._folder = (version, shown), result, shown
             self._draw()
 
     def _draw(self) -> None:
@@ -48,11 +50,13 @@ class ComparisonPanel:
         other = self._file.read(folder)
         if other is None or folder is None:
             text = EMPTY
-        elif not isinstance(self._result, StudyResult):
+        elif not isinstance(self._result, StudyResult) or self._folder is None:
             text = NOT_YET
+        elif folder == self._folder:
+            text = THE_SAME
         else:
-            name = title(folder) if title(folder) != self._name else f"{folder.parent.name}/{folder.name}"
-            text = comparison_markdown(self._result, other, (self._name, name))
+            one, another = titles([self._folder, folder])
+            text = comparison_markdown(self._result, other, (one, another))
         if self._words.content != text:
             self._words.content = text
 

@@ -171,6 +171,8 @@ class DiagnosisPanel(Panel):
         offered = self._offered()
         if tuple(self._data.options) != offered:
             self._data.options = offered
+        if self._folder.visible != (self._data.value == OWN):
+            self._folder.visible = self._data.value == OWN
         self._place.show()
         status = self._diagnosis.status()
         # How much more is poured, in this stage and after it, is decided by what comes out.
@@ -239,9 +241,8 @@ class DiagnosisPanel(Panel):
         assert folder is not None
         file = folder / CORRECTED_STUDY
         if not file.is_file():
-            why = (
-                "nothing is added" if not result.added else f"{folder} holds no {CORRECTED_STUDY}: run it with --apply"
-            )
+            why = f"{folder} holds no {CORRECTED_STUDY}: a diagnosis that is started here writes it"
+            why = why if result.added else "nothing is added"
             raise CommandError(f"there is no corrected model to calibrate: {why}")
         self._page.study.start(SHORT_PROFILE, file=file)
 

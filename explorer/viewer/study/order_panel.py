@@ -13,6 +13,7 @@ from explorer.photograph.target import OBSERVABLE
 from explorer.study.edit import RANGE_KEYS, StudyEdits, edited_study, listed_edits
 from explorer.units import checked, number, observable_label, parameter_label, unit_of_observable, unit_of_parameter
 from explorer.viewer.actions import Action, Post
+from explorer.viewer.number_box import with_decimals
 from explorer.viewer.study.process_view import escaped
 from explorer.viewer.tables.ranges_page import Range, RangeRow
 from solver import parameters
@@ -87,7 +88,8 @@ class OrderPanel:
             value = getattr(target, key)
             if value is not None:
                 label = f"Target: {word}{symbol}"
-                self._goal[key] = gui.add_number(label, float(number_on_screen(unit.of(value))), hint=f"Of {name}.")
+                shown = float(number_on_screen(unit.of(value)))
+                self._goal[key] = with_decimals(gui.add_number(label, shown, hint=f"Of {name}."))
         if target.n is not None:
             hint = f"Number of measured piles behind the mean and the SD of {name}."
             self._goal["n"] = gui.add_number("Target: measured piles", target.n, min=2, step=1, hint=hint)
@@ -96,7 +98,7 @@ class OrderPanel:
         """Three boxes for one factor."""
         symbol = unit_of_parameter(factor.path).symbol
         label = f"{factor.name} · {parameter_label(factor.path)}{f' [{symbol}]' if symbol else ''}"
-        return gui.add_vector3(label, self._in_file(factor), hint=COLUMNS)
+        return with_decimals(gui.add_vector3(label, self._in_file(factor), hint=COLUMNS))
 
     def _in_file(self, factor: Factor) -> tuple[float, float, float]:
         unit = unit_of_parameter(factor.path)

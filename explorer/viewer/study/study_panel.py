@@ -39,7 +39,7 @@ from explorer.viewer.study.process_view import (
     waiting_markdown,
 )
 from explorer.viewer.study.profiler_panel import ProfilerPanel
-from explorer.viewer.study.result_chooser import ResultChooser, title
+from explorer.viewer.study.result_chooser import ResultChooser
 from explorer.viewer.tables.ranges_page import RangesInHand, ranges_page
 from explorer.viewer.tables.runs_page import RunsInHand, runs_page
 from explorer.viewer.tables.table_server import link_html
@@ -167,18 +167,18 @@ class StudyPanel(Panel):
         try:
             result = None if content is None else study_from(content)
             self._left_out = () if folder is None else load_excluded(folder)
-            self._show_result(result, "" if folder is None else title(folder), shown)
+            self._show_result(result, folder, shown)
         except (RecordError, CommandError) as error:
             # A folder that somebody named may hold any JSON, also that of another version.
             self._trouble = f"{folder}: cannot be shown ({error})"
-            self._show_result(None, "", None)
+            self._show_result(None, None, None)
 
-    def _show_result(self, result: AnyStudy | None, name: str, version: Hashable) -> None:
+    def _show_result(self, result: AnyStudy | None, folder: Path | None, version: Hashable) -> None:
         self._result = result
         self._recording.offer(isinstance(result, StudyResult))
         self._profiler.show(result)
         self._plots.offer(self._profiler.plots(), version)
-        self._comparison.show(result, name, version)
+        self._comparison.show(result, folder, version)
 
     def _show_board(self) -> None:
         """The board of what is chosen."""

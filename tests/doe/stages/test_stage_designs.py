@@ -4,13 +4,18 @@ import copy
 import dataclasses
 import json
 import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from doe.analysis.pilot import Noise
 from doe.analysis.power import main_effect_efficiency, smallest_main_effect
 from doe.errors import StudyFileError
 from doe.stages import planned_runs
+from doe.stages.ascent import AscentResult
+from doe.stages.pilot import PilotResult
+from doe.stages.scan import ScanResult
 from doe.studies.campaign import run_campaign
 from doe.studies.profile import Profile
 from doe.studies.study import load_study, study_from, with_profile
@@ -153,3 +158,19 @@ def test_efficiency_is_one_for_orthogonal_two_level_designs_and_the_share_of_mov
     # In 2 m + 1 rows of a definitive screening design each factor is moved in 2 (m − 1).
     assert of == {"table": 1.0, "folded": 1.0, "definitive": pytest.approx(46 / 49)}
     assert smallest_main_effect(1.0, 3, 49, efficiency=46 / 49) > smallest_main_effect(1.0, 3, 49)
+
+
+def test_the_line_of_a_stage_has_digits_for_an_observable_of_any_size():
+    """A share of 0.05 is not 0.1."""
+    noise = Noise(runs=6, mean=0.0512, sigma=0.0021, low=0.0013, high=0.0051)
+    share = SimpleNamespace(noise={"share": noise}, estimator="share")
+    assert PilotResult.line.fget(share).startswith("share 0.0512 ± 0.0021 over 6 seeds (σ 95 % 0.0013 … 0.0051)")
+    angle = SimpleNamespace(noise={"angle_deg": dataclasses.replace(noise, mean=24.68)}, estimator="angle_deg")
+    assert PilotResult.line.fget(angle).startswith("angle_deg 24.7° ± 0.0° over 6 seeds")
+    means = np.array([0.0512, 0.0731])
+    walk = SimpleNamespace(
+        approach=None, observable="share", means=means, bracket=SimpleNamespace(statement="Between.")
+    )
+    assert AscentResult.line.fget(walk) == "0.0512, 0.0731. Between."
+    scanned = SimpleNamespace(path="h", values=(1, 2), observable="share", means=means, smallest_difference=0.02)
+    assert ScanResult.line.fget(scanned) == "h: 1 → 0.0512, 2 → 0.0731; smallest difference seen 0.02"

@@ -89,6 +89,16 @@ def test_an_effect_that_the_ruler_does_not_see_takes_no_part():
     assert set(limit(unseen, 6.0).by_effect) == {"a"}
 
 
+def test_where_no_effect_is_seen_there_is_no_limit():
+    found, unseen = two(0.0), (Strength(0.1, 0.2),) * 2
+    assert limit(Signatures(found.names, unseen, found.strength, found.cosines), 6.0) is None
+    nothing = {f"{name} {level}": 0.0 * unit(0) for name in "ab" for level in ("strong", "weak")}
+    levels = [Level(Direction(name, name, (0.5,)), 0.5, 12.0) for name in "ab"]
+    study = limit_study(sample_of(np.random.default_rng(2), nothing), levels, {"scalars": [3, 3]})
+    assert [one.kind.name for one in study.reached] == ["a", "b"]
+    assert study.rows == ()
+
+
 def test_two_directions_of_one_effect_are_one_name():
     """However alike: taking one for the other is no error."""
     kinds = [DataKind("tilt", "tilt x", True), DataKind("tilt", "tilt y", True)]

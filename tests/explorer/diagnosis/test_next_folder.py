@@ -15,7 +15,7 @@ from doe.diagnose.next_experiment import RankedExperiment
 from doe.diagnose.result import Suggestion
 from doe.errors import MeasurementError
 from doe.measurement.load import load_measurement
-from explorer.diagnosis.next_folder import CHANGED, read_next, setup_svg, write_next
+from explorer.diagnosis.next_folder import CHANGED, asks_for, read_next, setup_svg, write_next
 from explorer.errors import CommandError
 from solver import pour_rig, with_rig, with_values
 from solver.assets import measurement_folder
@@ -143,6 +143,17 @@ def test_the_order_says_what_was_asked(tmp_path, measured):
         "source": str(SOURCE.absolute()),
     }
     assert (folder / "scans/README.txt").read_text().count("\n") == 1
+
+
+def test_a_folder_asks_for_the_change_that_it_was_written_for(tmp_path, measured):
+    folder = written(tmp_path / "next", SOURCE, measured)
+    assert asks_for(folder, suggestion(TWICE, {}))
+    assert not asks_for(folder, suggestion(SHUT, {}))
+    assert not asks_for(tmp_path, suggestion(TWICE, {}))
+    order = json.loads((folder / "follow_up.json").read_text())
+    for wrong in ("{", "[]", json.dumps(order | {"schema": 2}), json.dumps(order | {"rivals": 1})):
+        (folder / "follow_up.json").write_text(wrong)
+        assert not asks_for(folder, suggestion(TWICE, {}))
 
 
 def test_an_unfilled_folder_is_refused(tmp_path, measured):

@@ -308,6 +308,14 @@ def test_the_project_s_measured_data_are_the_first_choice(server, tmp_path):
     assert room.process.asked == [("start", Question(str(tmp_path / "lot 7")))]
 
 
+def test_a_folder_is_asked_for_where_it_is_what_is_diagnosed(room):
+    room.show()
+    assert not room.person.sees("Folder")
+    room.person.enter("Measured data", "folder below")
+    room.show()
+    assert room.person.sees("Folder")
+
+
 def test_effects_budget_and_queue_are_asked_for_on_the_page(room):
     person = room.person.within("Effects in question, and how much is poured")
     boxes = [name.replace("_", " ") for name in EFFECTS]
@@ -393,12 +401,14 @@ def test_the_answer_s_buttons_pour_and_calibrate_the_corrected_model(server, tmp
         "What else is missing?",
     )
 
+    assert "explorer diagnose" not in board(panel)["banner"]["then"]
+
     def press_on_the_board(label):
         page.channel.take(json.dumps(acts[label]))
         return actions.carry_out()
 
     said = press_on_the_board("Calibrate the corrected model")
-    assert said.endswith(f"{tmp_path} holds no corrected_study.toml: run it with --apply")
+    assert said.endswith(f"{tmp_path} holds no corrected_study.toml: a diagnosis that is started here writes it")
     (tmp_path / "corrected_study.toml").touch()
     assert press_on_the_board("Calibrate the corrected model") == ""
     assert started == [("quick", tmp_path / "corrected_study.toml")]

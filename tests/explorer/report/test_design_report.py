@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from doe.analysis.surface import Blocks
 from doe.designs import box_behnken, central_composite, factorial, latin_hypercube, morris, plackett_burman
+from doe.designs.mixture import simplex_centroid
 from explorer.design.analysis import AnalyseOrder, analyse_runs
 from explorer.design.choices import Surrogate
 from explorer.design.factors_file import DesignFactor
@@ -20,6 +22,8 @@ from explorer.report.content import Figure, Folded, Table, Word
 from explorer.report.design import design_html, design_markdown
 from explorer.report.design.charts import design_plots
 from explorer.report.design.sections import banner, sections_of
+from explorer.report.figures.model import profiler, ranges
+from explorer.report.sections.optimum import ranges_caption
 
 pytestmark = pytest.mark.usefixtures("unprinted")
 
@@ -204,3 +208,100 @@ def test_a_small_response_is_not_rounded_away():
     assert banner(result).headline == "TARGET REACHED 0.001"
     runs_table = next(section for section in sections_of(result) if section.title == "Runs").blocks[0]
     assert len({row[-1] for row in runs_table.rows}) > 5
+
+
+def scaled(size):
+    """Three factors whose response and one range are ``size`` times those of the case."""
+    sheet, target = CASES["three factors"]
+    first = replace(sheet.factors[0], low=10.0 * size, high=20.0 * size, reference=14.0 * size)
+    sheet = replace(sheet, factors=(first, *sheet.factors[1:]), responses=size * sheet.responses)
+    return analyse_runs(sheet, AnalyseOrder("runs.csv", "load", size * target))
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e12])
+@pytest.mark.parametrize(
+    ("title", "key", "trace"),
+    [("Contours", "z", 0), ("Surface in 3-D, A and B", "z", 0), ("Solution surface", "value", 0)],
+)
+def test_a_chart_shows_a_response_of_any_size_as_finely(size, title, key, trace):
+    drawn, same = (
+        np.array(design_plots(scaled(one))[title].make()["data"][trace][key], dtype=float) / one for one in (size, 1.0)
+    )
+    # Both are rounded to a hundred-thousandth of their spread.
+    np.testing.assert_allclose(drawn, same, atol=2e-5 * np.ptp(same))
+
+
+def test_the_profile_of_a_small_response_is_no_step():
+    found = scaled(1e-9).fitted
+    curve = profiler(found, found.section_point)["data"][1]["y"]
+    assert len(set(curve)) > 25
+
+
+@pytest.mark.parametrize("kind", ["screening", "morris", "random groups", "names"])
+def test_a_small_effect_is_not_rounded_away(kind):
+    sheet, _ = CASES[kind]
+    found = analyse_runs(replace(sheet, responses=1e-9 * sheet.responses), AnalyseOrder("runs.csv", "load"))
+    for text in (design_markdown(found), analysis_text(found)):
+        assert not re.search(r"[+−-]0\.0+\b", text)
+
+
+@pytest.mark.parametrize("kind", ["one factor", "fifteen factors", "two factors"])
+def test_a_design_has_the_plots_that_there_is_room_for(kind):
+    sheet, target = CASES[kind]
+    plots = design_plots(analyse_runs(sheet, AnalyseOrder("runs.csv", "load", target)))
+    for plot in plots.values():
+        spec = plot.make()
+        go.Figure(spec["data"], spec["layout"])
+    assert ("Contours" in plots) == (kind == "two factors")
+
+
+@pytest.mark.parametrize("kind", ["random groups", "mixture"])
+def test_what_takes_no_target_is_not_told_to_be_asked_for_one(kind):
+    if kind == "mixture":
+        shares = simplex_centroid(3)
+        sheet = runs(2 * np.vstack([shares, shares]) - 1, np.tile(9 + shares @ [1, 2, 0], 2) + 0.01 * noise(14))
+        sheet = replace(sheet, factors=tuple(replace(one, low=0.0, high=1.0, reference=0.5) for one in sheet.factors))
+    else:
+        sheet, _ = CASES[kind]
+    found = banner(analyse_runs(sheet, AnalyseOrder("runs.csv", "load", random="day" if sheet.groups else "")))
+    assert found.word is Word.EFFECT_FOUND
+    assert "--target" not in found.then or "--block … --target" in found.then
+
+
+def test_the_methods_count_settings_once_and_say_what_was_fitted():
+    three = design_markdown(analyse_runs(CASES["without a target"][0], AnalyseOrder("runs.csv", "load")))
+    assert "17 runs at 13 settings of 3 factors were analysed for load" in three
+    one = design_markdown(analyse_runs(CASES["one factor"][0], AnalyseOrder("runs.csv", "load")))
+    assert "6 runs at 5 settings of 1 factor were analysed" in one
+    for kind, words in (("random groups", "restricted maximum likelihood"), ("morris", "Morris 1991")):
+        text = design_markdown(analyse_runs(CASES[kind][0], AnalyseOrder("runs.csv", "load")))
+        assert words in text.partition("## Methods")[2]
+        assert "Sums of squares are partial" not in text
+
+
+def test_markdown_takes_no_name_for_markup():
+    sheet = names()
+    odd = (r"x~~y~~", "a$b$", "u&lt;v")
+    second = replace(sheet.factors[1], levels=odd)
+    sheet = replace(sheet, factors=(sheet.factors[0], second, sheet.factors[2]))
+    text = design_markdown(analyse_runs(sheet, AnalyseOrder("runs.csv", "load")))
+    for raw, told in zip(odd, (r"x\~\~y\~\~", r"a\$b\$", r"u\&lt;v"), strict=True):
+        assert raw not in text
+        assert told in text
+
+
+def test_the_caption_of_the_ranges_names_the_bars_that_are_drawn():
+    open_ = analyse_runs(CASES["three factors"][0], AnalyseOrder("runs.csv", "load", 10.0))
+    known = analyse_runs(CASES["one factor"][0], AnalyseOrder("runs.csv", "load", 5.0))
+    far = analyse_runs(CASES["two factors"][0], AnalyseOrder("runs.csv", "load", 1e6))
+    for found in (open_, known, far):
+        text, drawn = ranges_caption(found.optimum, "n = 17"), {one.get("name") for one in ranges(found.fitted)["data"]}
+        assert ("bootstrap" in text) == ("95 % set of the optimum (bootstrap)" in drawn)
+        assert ("gives the target" in text) == ("range that gives the target" in drawn)
+
+
+def test_an_axis_has_powers_of_ten_and_no_letters_for_them():
+    """By default 2e-8 would be 20n, and 1e9 1B."""
+    layout = design_plots(scaled(1e-9))["Contours"].make()["layout"]
+    axes = [one for key, one in layout.items() if key.startswith(("xaxis", "yaxis"))]
+    assert {one["exponentformat"] for one in [*axes, layout["coloraxis"]["colorbar"]]} == {"power"}

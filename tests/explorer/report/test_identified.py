@@ -249,3 +249,29 @@ def test_of_several_targets_no_sentence_calls_the_chosen_setting_that_of_one():
     spec = next(block for block in section.blocks if getattr(block, "name", "") == "cloud").spec
     star = next(trace for trace in spec["data"] if trace["marker"].get("symbol") == "star")
     assert star["x"] == [pytest.approx(values[0])]
+
+
+def test_the_ranges_of_several_targets_are_those_of_their_table():
+    several = typed(reported_studies.result_of_case("two targets"))
+    found, fitted = several.optimum, fitted_targets(several)[0]
+    drawn = [trace for trace in ranges(fitted)["data"] if trace["name"] == "95 % interval by all targets"]
+    told = [parameter_range(path, one.low, one.high) for path, one in found.estimates.items()]
+    assert [trace["hovertemplate"].removesuffix("<extra></extra>").partition(": ")[2] for trace in drawn] == told
+    assert "range that gives the target" not in {trace["name"] for trace in ranges(fitted)["data"]}
+    alone = replace(fitted, optimum=replace(found, posterior=None))
+    names = {trace["name"] for trace in ranges(alone)["data"]}
+    assert "range that gives the target, first target alone" in names
+    assert study_plots(several)["Optimum and its refits"].caption.endswith(
+        "The refits are of the first target alone, the star is the setting of all targets."
+    )
+
+
+def test_a_study_of_a_share_is_compared_in_numbers_that_say_something():
+    """Of a plain number two places would cut away what there is."""
+    result = typed(reported_studies.result_of_case("planted"))
+    part = result.screening
+    small = [replace(one, effect=1e-4 * one.effect) for one in part.analysis.effects]
+    part = replace(part, response="own:share []", analysis=replace(part.analysis, effects=tuple(small)))
+    both = (replace(result, screening=part),) * 2
+    rows = comparison(*both, ("one", "other"))[2].rows
+    assert not any(row[1].startswith(("+0.00 ", "−0.00 ")) for row in rows)

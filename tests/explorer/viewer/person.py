@@ -16,6 +16,7 @@ from viser._gui_handles import GuiProgressBarHandle, _GuiInputHandle
 
 from explorer.viewer.incoming import valid_value
 
+NUMBER_BOXES = (viser.GuiNumberHandle, viser.GuiVector2Handle, viser.GuiVector3Handle)
 TEXTS = (viser.GuiHtmlHandle, viser.GuiMarkdownHandle)
 
 
@@ -132,6 +133,11 @@ class Person:
         """The charts that are drawn here, as Plotly has them."""
         charts = (one for one in self._walk(self._place) if isinstance(one, viser.GuiPlotlyHandle))
         return [json.loads(one._plotly_json_str) for one in charts]
+
+    @property
+    def number_boxes(self):
+        """viser's handles of the boxes for one number or several that are seen here."""
+        return [one for one in self._controls() if isinstance(one, NUMBER_BOXES)]
 
     @property
     def progress(self):

@@ -449,10 +449,10 @@ def test_a_sheet_is_made_and_a_filled_one_analysed(design, analysis):
     assert "Contours" in analysis.options("Chart of it")
     assert analysed(Drop_terms="by AICc", Model="quadratic") == ""
     assert "--model quadratic --reduce aicc" in analysis.text
-    assert "stands instead of --model" in analysed(Terms="A, B")
+    assert analysed(Terms="A, B") == "Terms: stands instead of Model; allowed: one of them"
     assert "target 'steep'" in analysed(Terms="", Target="steep")
     assert "allowed: 0 and more" in analysed(Target="24.68", **{error: "-1"})
-    assert "--block shift: no column of blocks" in analysed(Target="", Block="shift", **{error: ""})
+    assert "Block shift: no column of blocks" in analysed(Target="", Block="shift", **{error: ""})
 
 
 def test_an_audit_of_the_shipped_article_and_of_an_archive(room):

@@ -234,7 +234,7 @@ def test_a_logarithmic_slider_spans_whole_decades_within_the_range():
     assert [decade_mark(power) for power in (-1, 0, 2, 3, 4)] == ["0.1", "1", "100", "10³", "10⁴"]
 
 
-BOX, POWER = "Shear modulus [MPa]", "log₁₀ of MPa"
+BOX, POWER = "Shear modulus [MPa]", "log₁₀ MPa"
 
 
 def control(server, name, prefix="material.seed"):

@@ -157,6 +157,15 @@ def test_a_recording_whose_folder_is_gone_ends_in_one_line_and_the_page_goes_on(
     wait_for(lambda: "Start" in export.options("Record"))
 
 
+def test_a_file_that_was_sent_is_refused_by_its_name_without_its_folder(running, tmp_path):
+    sheet = running.person.within("Filled sheet → model and optimum")
+    sheet.upload("Upload: sheet", "runs.csv", b"run,angle\n1,\n")
+    sheet.press("Analyse")
+    laboratory = running.person.within("Laboratory")
+    wait_for(lambda: "runs-" in laboratory.text)
+    assert str(tmp_path) not in laboratory.text
+
+
 class FullDisk:
     """A recorder that cannot go on."""
 

@@ -199,6 +199,12 @@ def bodies(page):
     return page.server.scene.get_handle_by_name("/bodies/0")
 
 
+def test_no_box_of_the_page_drops_the_decimal_point_but_those_of_counts(page):
+    boxes = page.person.number_boxes
+    assert {one.label for one in boxes} >= {"Target: mean [°]", "Feed rate [g/s]", "Tap: time [ms]", "Mass [g]"}
+    assert [one.label for one in boxes if not isinstance(one.value, int) and one.precision < 1] == []
+
+
 def test_left_arrow_goes_back_and_space_goes_on(beads, browser):
     browser.press(PLAY_PAUSE)
     wait_for(lambda: status(beads).time > 0.4)

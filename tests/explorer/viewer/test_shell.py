@@ -4,6 +4,7 @@ import asyncio
 import http.client
 import json
 import math
+import threading
 from dataclasses import replace
 
 import pytest
@@ -22,6 +23,7 @@ from explorer.viewer.shell.timeline import FASTEST, Timeline, timeline_state
 from explorer.viewer.shell.web_pages import WebPage, WebPages, first_page
 from solver.observables.observable import Value
 from solver.pours.record import Outcome
+from tests.explorer.background.waiting import wait_for
 from tests.explorer.viewer.page_session import PageSession, page_context
 from tests.explorer.viewer.study_panel_at_hand import FakeStudy
 
@@ -185,6 +187,19 @@ def test_the_timeline_shows_this_pour_s_events_up_to_now():
     assert "0.50 × real time" in state["condition"]
     assert state["notice"] == "no such folder"
     json.dumps(state, allow_nan=False)
+
+
+def test_the_timeline_says_what_is_done_beside_the_pour(at_hand):
+    session, context = at_hand
+    timeline = Timeline(context)
+    held = threading.Event()
+    context.bench_work.start("reading the photograph", held.wait, lambda _: None)
+    timeline.show(Now(session.now))
+    assert context.channel.told["timeline"]["busy"] == "Busy reading the photograph …"
+    held.set()
+    wait_for(lambda: not context.bench_work.busy_with)
+    timeline.show(Now(session.now))
+    assert context.channel.told["timeline"]["busy"] == ""
 
 
 def test_the_state_line_says_how_far_a_project_is(at_hand):

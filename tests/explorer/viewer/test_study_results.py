@@ -129,6 +129,20 @@ def test_a_result_from_elsewhere_is_added_and_compared(table, result, tmp_path):
     assert "name a folder" in table.others.press("Add to the list")
 
 
+def test_compared_studies_have_the_names_of_the_lists_and_no_study_is_compared_with_itself(table, result, tmp_path):
+    for folder in ("here", "away"):
+        (tmp_path / folder).mkdir()
+    table.study.done = tuple(written(tmp_path / folder / "study-2", result) for folder in ("here", "away"))
+    table.show()
+    comparison = table.person.within("Compare two studies")
+    first, second = comparison.options("Compare with")[1:]
+    table.others.enter("Result", first)
+    comparison.enter("Compare with", second)
+    assert f"| | {first} | {second} |" in comparison.text
+    comparison.enter("Compare with", first)
+    assert comparison.text == "This is the study above: choose another one."
+
+
 def test_a_result_from_elsewhere_of_the_same_name_is_the_one_that_is_shown(table, result, tmp_path):
     (tmp_path / "away").mkdir()
     own, away = written(tmp_path / "study-2", result), written(tmp_path / "away" / "study-2", result)

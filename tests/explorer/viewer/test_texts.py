@@ -22,6 +22,7 @@ from explorer.viewer.pour.readout import (
     AngleDoubt,
     condition,
     not_later,
+    pace,
     readout_html,
 )
 from explorer.viewer.pour.standing_panel import notes, recent
@@ -65,6 +66,11 @@ def test_the_readout_tells_what_the_solver_said():
     assert "class='dot'" not in readout_html(STATUS, by_component=False)
     assert "left 21.0°" in text
     assert "right –" in text
+
+
+@pytest.mark.parametrize(("factor", "said"), [(0.336, "0.34"), (1.0, "1.00"), (0.0043, "0.004"), (0.0, "0")])
+def test_a_slow_pour_is_not_said_to_stand(factor, said):
+    assert pace(replace(STATUS, real_time_factor=factor)) == said
 
 
 def test_the_time_step_is_told_against_its_limit():
