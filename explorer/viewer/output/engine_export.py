@@ -65,7 +65,9 @@ def packed_export(scene: Path, program: str, seed: int) -> bytes:
     """
     with tempfile.TemporaryDirectory() as apart:
         folder = Path(apart) / f"{scene.stem}_{program}"
-        of_pour = [] if EXPORTS[program].of_material else ["--seed", str(seed)]
+        of_pour = ["--seed", str(seed)]
+        if program in EXPORTS and EXPORTS[program].of_material:
+            of_pour = []
         command_output(["export", str(scene), str(folder), "--to", program, *of_pour])
         written = sorted(one for one in folder.rglob("*") if one.is_file())
         return zipped({str(path.relative_to(apart)): path for path in written})
