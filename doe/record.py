@@ -158,7 +158,10 @@ def _one_of(kinds: tuple[Any, ...], value: Any, where: str) -> Any:
 
 def _scalar(kind: Any, value: Any, where: str) -> Any:
     if kind is float and (value is None or (isinstance(value, int | float) and not isinstance(value, bool))):
-        return math.nan if value is None else float(value)
+        try:
+            return math.nan if value is None else float(value)
+        except OverflowError:  # an integer beyond every float
+            raise _unexpected(where, "float", value) from None
     if kind in (bool, str) and isinstance(value, kind):
         return value
     if kind is int and isinstance(value, int) and not isinstance(value, bool):
@@ -179,7 +182,7 @@ def _array(arguments: tuple[Any, ...], value: Any, where: str) -> Any:
         if issubclass(number, np.floating):
             return np.array(value, dtype=np.float64)  # None becomes NaN
         return np.array(value, dtype=number)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise _unexpected(where, "an array of numbers", value) from None
 
 

@@ -194,7 +194,10 @@ class CommandProcess:
             return {"state": "cancelled", "message": ""}
         if code in self._endings:
             return {"state": "finished", "message": f"{self._endings[code]}: {self.out}/report.html"}
-        return {"state": "failed", "message": f"{self._command} ended with exit code {code}: {self._last_words()}"}
+        how = f"ended with exit code {code}"
+        if code < 0:
+            how = f"was ended from outside, or for want of memory (signal {-code}); its last line"
+        return {"state": "failed", "message": f"{self._command} {how}: {self._last_words()}"}
 
     def _last_words(self) -> str:
         log = self._log()

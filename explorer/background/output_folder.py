@@ -39,10 +39,13 @@ def kept_for_one(folder: Path) -> Iterator[None]:
     folder.mkdir(parents=True, exist_ok=True)
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise CommandError(
+                f"--out {folder}: another command is at work there; wait for it, or name another"
+            ) from None
         yield
-    except BlockingIOError:
-        raise CommandError(f"--out {folder}: another command is at work there; wait for it, or name another") from None
     finally:
         os.close(descriptor)
 
@@ -123,7 +126,10 @@ def checked_folder(text: str, name: str) -> Path:
 
 
 def _object(file: Path) -> dict[str, Any]:
-    content = json.loads(file.read_text(encoding="utf-8"))
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except RecursionError:
+        raise ValueError("brackets within brackets without end") from None
     if not isinstance(content, dict):
         raise ValueError("not a JSON object")
     return content

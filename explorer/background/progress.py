@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -162,7 +163,10 @@ def time_left(eta_s: float | None) -> str:
 
 @contextmanager
 def told_of_pauses(went_on: Callable[[], None]) -> Iterator[None]:
-    """Call ``went_on`` whenever this process goes on after a pause (SIGCONT); main thread only."""
+    """Call ``went_on`` whenever this process goes on after a pause (SIGCONT), which only its main thread can hear."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
     before = signal.signal(signal.SIGCONT, lambda number, frame: went_on())
     try:
         yield

@@ -25,6 +25,10 @@ def runs(
         beside = f"; other stores there: {', '.join(other.name for other in others)}" if others else ""
         raise CommandError(f"{path}: no store of runs there yet; `explorer calibrate --headless` makes one{beside}")
     kept = Store(path, pouring=False)
+    if study is not None and not any(True for _ in kept.runs(study)):
+        raise CommandError(
+            f"--study {study}: no runs of it in {path}; `explorer runs --store {path}` lists its studies"
+        )
     if csv:
         # All of them first: what is read anew is written back.
         write_csv(

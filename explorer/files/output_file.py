@@ -47,7 +47,11 @@ def write_whole(path: Path, text: str) -> None:
 
 
 def write_whole_bytes(path: Path, contents: bytes) -> None:
-    """The same for ``contents``."""
+    """The same for ``contents``. A link stays one; into a device or a pipe, such as /dev/stdout, they are written."""
+    if path.exists() and not path.is_file() and not path.is_dir():
+        path.write_bytes(contents)
+        return
+    path = path.resolve()
     temporary = path.with_name(f".{path.name}.part")
     try:
         temporary.write_bytes(contents)

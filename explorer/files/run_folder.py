@@ -48,19 +48,32 @@ def appearing(folder: Path, option: str = "--out") -> Iterator[Path]:
     Raises :class:`CommandError` where ``folder`` is not vacant, OSError where it cannot be made.
     """
     check_vacant(folder, option)
-    folder = folder.absolute()
+    folder = folder.resolve()
     folder.parent.mkdir(parents=True, exist_ok=True)
-    temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    beside = os.access(folder.parent, os.W_OK) or not folder.is_dir()
+    temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent if beside else folder))
     try:
         yield temporary
         # mkdtemp gives access to the owner only; a result folder has the rights of any new folder.
         temporary.chmod(0o777 & ~_umask())
-        check_vacant(folder, option)
-        if folder.is_dir():
-            folder.rmdir()
-        temporary.rename(folder)
+        check_vacant(folder, option, own=[temporary])
+        if _removed(folder):
+            temporary.rename(folder)
+        else:
+            for made in list(temporary.iterdir()):
+                shutil.move(made, folder / made.name)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _removed(folder: Path) -> bool:
+    """Whether the place of ``folder``, which is empty or not there, is free now: that of a mounted one cannot be."""
+    try:
+        if folder.is_dir():
+            folder.rmdir()
+    except OSError:
+        return False
+    return True
 
 
 def _umask() -> int:

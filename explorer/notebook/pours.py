@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -261,9 +262,24 @@ def pour(source: Source, settings: Settings | None = None, *, seed: int = 1) -> 
 
 
 def _checked_seed(seed: int) -> int:
-    if seed != int(seed) or seed < 0:
-        raise ParameterError(f"seed {seed}: allowed: a whole number from 0 on")
+    # Neither NaN nor infinity is equal to what is left of it; a store keeps 64 bits with a sign.
+    if not isinstance(seed, int | float | np.integer) or seed != seed // 1 or not 0 <= seed < 2**63:
+        raise ParameterError(f"seed {seed}: allowed: a whole number from 0 on, below 2^63")
     return int(seed)
+
+
+def _checked_seeds(seeds: int | Iterable[int]) -> tuple[int, ...]:
+    """Seeds that are told one by one or by their number. Raises ParameterError where there are none, or one twice."""
+    if isinstance(seeds, Iterable):
+        numbers = tuple(map(_checked_seed, seeds))
+    else:
+        numbers = tuple(range(1, int(seeds) + 1)) if seeds == seeds // 1 else ()
+    if not numbers:
+        raise ParameterError(f"seeds {seeds}: allowed: a number of seeds from 1 on, or the seeds themselves")
+    seed, times = Counter(numbers).most_common(1)[0]
+    if times > 1:
+        raise ParameterError(f"seeds: {seed} is there {times} times, and would be one pour that counts as several")
+    return numbers
 
 
 def sweep(
@@ -288,7 +304,7 @@ def sweep(
     values
         Path → values, as in :func:`load`; several paths make a full grid, and none at all replicates the scene.
     seeds
-        Seeds, or their number N for 1 … N; the same for every combination.
+        Seeds, each once, or their number N for 1 … N; the same for every combination.
     observables
         Names to be listed; all of the rig if not given.
     store
@@ -309,7 +325,7 @@ def sweep(
     Raises
     ------
     ValueError
-        One line about a path, a value, an observable or the store, before anything is poured.
+        One line about a path, a value, the seeds, an observable, the workers or the store, before anything is poured.
     """
     from doe.pour_runner import PourRunner
     from doe.run_records import Setting
@@ -321,11 +337,11 @@ def sweep(
     for name in names:
         if name not in given:
             raise ParameterError(f"observables: {name!r} is not one of {', '.join(given)}")
-    if isinstance(seeds, int | np.integer):
-        numbers = tuple(range(1, _checked_seed(int(seeds)) + 1))
-    else:
-        numbers = tuple(map(_checked_seed, seeds))
-    levels = [one if isinstance(one, Iterable) and not isinstance(one, str) else [one] for one in values.values()]
+    numbers = _checked_seeds(seeds)
+    levels = [list(one) if isinstance(one, Iterable) and not isinstance(one, str) else [one] for one in values.values()]
+    for path, level in zip(values, levels, strict=True):
+        if not level:
+            raise ParameterError(f"{path}: no values; name one or more, or leave it out")
     grid = [dict(zip(values, row, strict=True)) for row in product(*levels)]
     # As they are in the scene: in SI, and a mass fraction after those that were set behind it.
     poured = [{path: value(changed, path) for path in values} for changed in (with_values(scene, row) for row in grid)]
@@ -333,6 +349,7 @@ def sweep(
     settings = [Setting(label, row, len(numbers)) for label, row in zip(labels, grid, strict=True)]
     total = len(settings) * len(numbers)
     with ExitStack() as stack:
+        crew = stack.enter_context(executor(workers)) if chosen() == "cpu" else None
         kept = Store(default_store() if store is None else Path(store))
         stack.callback(kept.close)
         bar = Bar() if progress else None
@@ -344,7 +361,6 @@ def sweep(
             if bar:
                 bar.show(f"{total - left} of {total} pours", total - left, total)
 
-        crew = stack.enter_context(executor(workers)) if chosen() == "cpu" else None
         runner = PourRunner(
             scene, kept, "sweep", 0, workers, on_run=ended, pours=crew.run_queue if crew else None, seeds=numbers
         )

@@ -20,7 +20,7 @@ def read_baseline(path: Path) -> StudyResult:
     """The finished result in ``path``. Raises CommandError in one line."""
     try:
         return StudyResult.from_dict(json.loads(path.read_text(encoding="utf-8")))
-    except (RecordError, ValueError) as error:
+    except (RecordError, ValueError, RecursionError) as error:
         raise CommandError(f"--baseline {path}: no result.json of a finished study ({error})") from None
 
 

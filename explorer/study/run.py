@@ -37,7 +37,7 @@ from doe.studies.study_result import (
     StudyResult,
     Timing,
 )
-from explorer.background.output_folder import kept_for_one, read_result
+from explorer.background.output_folder import ResultFile, kept_for_one, read_result
 from explorer.background.progress import RunProgress, told_of_pauses
 from explorer.background.reporter import Reporter
 from explorer.errors import CommandError
@@ -110,6 +110,7 @@ def run_study(order: StudyOrder, reporter: Reporter) -> StudyResult:
     # The page puts these there before the start.
     own = [study.file, *([order.target] if order.target else [])]
     check_vacant(order.out, own=own, resume=order.resume)
+    _check_same(order.out, study)
     if order.record is not None:
         from explorer.recordings.pour_recorder import check_recordings
 
@@ -271,6 +272,17 @@ def _finished(out: Path, file: Path, profile: str) -> StudyResult | None:
     if (Path(found.file).absolute(), found.profile.name) != (file.absolute(), profile):
         raise CommandError(f"--out {out}: holds the result of {found.file}, profile {found.profile.name}")
     return result
+
+
+def _check_same(out: Path, study: Study) -> None:
+    """Raise CommandError where ``out`` holds what another study has found, which going on there would overwrite.
+
+    Of any version of the program, and whatever was changed in the study since.
+    """
+    described = (ResultFile(RESULT, PARTIAL).read(out) or {}).get("study")
+    name = described.get("name") if isinstance(described, dict) else None
+    if isinstance(name, str) and name != study.name:
+        raise CommandError(f"--out {out}: holds the study {name}, not {study.name}; name another folder")
 
 
 class PartialResult:

@@ -38,12 +38,21 @@ LEAST_HIGH = 10.0
 """Pixels of the picture: of a layer of bodies that is no higher it cannot be seen that it is none."""
 EVEN = 0.15
 """Rise over run by which the top of a body under the pile may slope."""
+CORNER = 0.08
+"""Share of its height below its top, where the outline of a body under the pile has hardly come in since half of it."""
+SQUARE, BLURRED = 0.13, 1.9
+"""By how much at most, over its height and in pixels of the picture: found are up to 0.10 and 1.9."""
+BALL = 0.27
+"""A sphere's comes in by 0.23 of its height, and that of a layer of alike bodies by 0.16 to 0.23: what does so by more
+is a rim that is seen from above."""
 FLAT, ROUND = 1.0, 0.003
 """Pixels of the picture, and share of the height, by which it may miss a line (root mean square)."""
 NECK, STEADY = 1.25, 0.9
 """Width of the end of a tip over that where it is thinnest, and of its beginning over that."""
 LEAST_NECK = 0.15
 """Of the height: a body that sticks out of the apex is shorter."""
+ROUND_END = 0.1
+"""Share of a tip, from its upper end, by which a body on the apex has not come to its width yet."""
 THINNEST = 0.3
 """Of the width of the pile: a tip is thinner."""
 THIN, LONG = 0.15, 0.12
@@ -88,10 +97,23 @@ def support_under(tops: Array, pixel: float) -> Support | None:
     # The highest one: what is under it is looked for again from there.
     for k in both[::-1]:
         found = _top(tops, apex, reach[:, z[k] + half], reach[:, z[k] - half], pixel)
-        if found is not None:
+        if found is not None and not _of_bodies(found, reach, pixel):
             best = k - int(size.min(axis=0)[max(0, k - 2 * half) : k + 1][::-1].argmax())
             return _top(tops, apex, reach[:, z[best] + half], reach[:, z[best] - half], pixel) or found
     return None
+
+
+def _of_bodies(found: Support, reach: Array, pixel: float) -> bool:
+    """Whether a corner of this top is as round as a body's: alike bodies in one layer end at one height as well.
+
+    ``reach`` is that of the outline, per side and height.
+    """
+    for side, end in zip(reach, (found.left, found.right), strict=True):
+        height = found.height + found.slope * end
+        corner = side[round(0.5 * height)] - side[round((1.0 - CORNER) * height)]
+        if max(SQUARE * height, BLURRED * pixel) < corner <= BALL * height:
+            return True
+    return False
 
 
 def severed(part: Image) -> Image | None:
@@ -106,8 +128,9 @@ def severed(part: Image) -> Image | None:
     tip = tip[tip < widest]
     if tip.size == 0:
         return None
-    last = int(np.flatnonzero(width[:widest] <= NECK * width[tip[-1] - long : tip[-1] + 1].min())[-1])
-    if last + 8 > rows.size:
+    neck = width[tip[-1] - long : tip[-1] + 1].min()
+    last = int(np.flatnonzero(width[:widest] <= NECK * neck)[-1])
+    if last + 8 > rows.size or width[round(ROUND_END * last)] < STEADY * neck:
         return None
     cut = part.copy()
     cut[: rows[last] + 1] = False

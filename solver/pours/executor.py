@@ -74,7 +74,8 @@ def check_scheduler(address: str, threads: int | None = None) -> None:
 def executor(workers: int | None = None, scheduler: str = "") -> Executor:
     """``workers`` processes of this machine (None: one per core), or those of the Dask ``scheduler`` ("tcp://…").
 
-    Raises SchedulerError where that is no address, nobody answers there, or Dask is not installed.
+    Raises SchedulerError where that is no address, nobody answers there, or Dask is not installed, ParameterError for
+    less than one worker.
     """
     if scheduler:
         from solver.pours.dask_pool import DaskPool

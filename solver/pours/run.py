@@ -125,11 +125,15 @@ def run_queue(
                     yield job, pour.record()
 
 
-def run_job(batch: Batch, job: Job) -> Record:
-    """Run one job in world 0 of ``batch``, which nothing else uses meanwhile."""
+def run_job(batch: Batch, job: Job, at_launch: Callable[[], None] = lambda: None) -> Record:
+    """Run one job in world 0 of ``batch``, which nothing else uses meanwhile.
+
+    ``at_launch`` is called before each launch.
+    """
     pour = job.begin(batch, 0)
     steps = np.zeros(batch.capacity.worlds, dtype=np.int32)
     while (due := pour.steps_due()) > 0:
+        at_launch()
         steps[0] = due
         pour.after(due, batch.advance(steps)[0])
     return pour.record()

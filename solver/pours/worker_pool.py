@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from solver.params import ParameterError
 from solver.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -59,9 +60,14 @@ class PourBrokeOff(RuntimeError):
 
 
 class WorkerPool:
-    """Processes that are started when they are first needed and kept for the next queue."""
+    """Processes that are started when they are first needed and kept for the next queue.
+
+    ``workers``: how many; None: one per core. Raises ParameterError for less than one.
+    """
 
     def __init__(self, workers: int | None = None) -> None:
+        if workers is not None and (not isinstance(workers, int | np.integer) or workers < 1):
+            raise ParameterError(f"workers {workers}: allowed: a whole number from 1 on")
         self.workers = workers or os.cpu_count() or 1
         """How many pour at the same time."""
         self._processes: list[tuple[BaseProcess, Connection]] = []
@@ -292,13 +298,20 @@ def _work(pipe: Connection) -> None:
                 (rooms.make if begun else rooms.begin)(order)
                 begun = True
                 continue
-            answer: Any = None if order is None else run_job(rooms.for_scene(order.scene), order)
+            answer: Any = None if order is None else run_job(rooms.for_scene(order.scene), order, _end_with_parent)
         except Exception as error:  # whatever it is, the process in charge has to know
             answer = error
         try:
             pipe.send(answer)
         except BrokenPipeError:
             return
+
+
+def _end_with_parent() -> None:
+    """End this process where the one in charge was killed: nobody waits for its pour, which may take hours more."""
+    in_charge = mp.parent_process()
+    if in_charge is not None and not in_charge.is_alive():
+        raise SystemExit
 
 
 @dataclass(frozen=True)

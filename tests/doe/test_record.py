@@ -102,6 +102,8 @@ def test_a_field_that_has_a_default_may_be_missing_and_a_key_that_is_no_field_is
         ("inner", 3, "inner: 3 is not the fields of Inner"),
         ("rows", [["a", "b"]], r"rows\[0\]\[1\]: 'b' is not float"),
         ("rows", [["a"]], r"rows\[0\]: \['a'\] is not 2 values"),
+        ("rows", [["a", 10**400]], r"rows\[0\]\[1\]: 1000*… is not float"),
+        ("array", [10**400], r"array: \[1000*… is not an array of numbers"),
         ("pair", "x", "pair: 'x' is not a list"),
         ("array", ["x"], r"array: \['x'\] is not an array of numbers"),
         ("table", [1], r"table: \[1\] is not names with values"),

@@ -1,13 +1,15 @@
 """A power cut, a full disk and a locked file cost at most the pour that was being written, and are told in one line."""
 
 import dataclasses
+import os
 import shutil
 import sqlite3
 from contextlib import closing
 
 import pytest
 
-from doe.store import Store, StoreError
+from doe.store import Store, StoreError, observables_of
+from doe.store_upkeep import check, count, merge
 from tests.doe.test_store import RUN
 
 FRAME = 24 + 4096
@@ -96,3 +98,64 @@ def test_an_empty_file_becomes_a_store(tmp_path):
     """Killed before the first page was written."""
     (tmp_path / "r.sqlite").touch()
     assert kept(tmp_path / "r.sqlite") == []
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ("DELETE FROM store", "does not say of which physics it is"),
+        ("UPDATE store SET physics = 'two'", "does not say of which physics it is"),
+        ("UPDATE pours SET observables = '[]'", "run k1: its parameters, readings or raw pour cannot be read"),
+        ("UPDATE pours SET parameters = 'null'", "run k1: its parameters, readings or raw pour cannot be read"),
+        ("UPDATE pours SET raw = 'text'", "run k1: its parameters, readings or raw pour cannot be read"),
+    ],
+)
+def test_a_store_changed_by_hand_is_one_line(tmp_path, change, says):
+    path = tmp_path / "r.sqlite"
+    with closing(Store(path)) as store:
+        store.add(run(1))
+    with closing(sqlite3.connect(path)) as other, other:
+        other.execute(change)
+    with pytest.raises(StoreError, match=rf"r\.sqlite: .*{says}"), closing(Store(path)) as store:
+        store.read(store.find("k1"), ("new",), observables_of)
+
+
+@pytest.mark.parametrize("byte", [b"\xfb", b"["])
+def test_a_complaint_about_damaged_text_is_one_line(tmp_path, byte):
+    """SQLite quotes the table's declaration, line by line, and Python cannot read what is no UTF-8 in it."""
+    path = tmp_path / "r.sqlite"
+    with closing(Store(path)) as store:
+        store.add(run(1))
+    path.write_bytes(path.read_bytes().replace(b"key TEXT PRIMARY", b"key TEXT " + 7 * byte, 1))
+    for command in (kept, check):
+        with pytest.raises(StoreError, match=r"r\.sqlite: cannot be used as a store of runs \(.*\)") as found:
+            command(path)
+        assert "\n" not in str(found.value)
+
+
+@pytest.fixture
+def sealed(tmp_path, monkeypatch):
+    """A store on a medium that takes nothing; the one who runs the tests may be allowed to write anywhere."""
+    path = tmp_path / "sealed" / "r.sqlite"
+    with closing(Store(path)) as store:
+        store.add(dataclasses.replace(run(1), readings=RUN.readings - 1))
+    monkeypatch.setattr(os, "access", lambda place, mode: path.parent not in (place, place.parent))
+    return path
+
+
+def test_a_store_that_cannot_be_written_is_read_as_one_that_nobody_changes(tmp_path, sealed):
+    assert [count(sealed, RUN.study), check(sealed).damaged] == [1, ()]
+    with closing(Store(sealed, pouring=False)) as store:
+        found = store.read(store.find("k1"), ("apex_height_m",), observables_of)
+        assert found.observables["apex_height_m"] > 0.0
+        with pytest.raises(StoreError, match="readonly"):
+            store.add(run(2))
+    assert [one.name for one in sealed.parent.iterdir()] == [sealed.name]
+    ours = tmp_path / "ours.sqlite"
+    Store(ours).close()
+    assert merge(ours, sealed).added == 1
+
+
+def test_a_store_that_cannot_be_written_is_refused_before_anything_is_poured(sealed):
+    with pytest.raises(StoreError, match=r"r\.sqlite: cannot be written; name another file for new pours"):
+        Store(sealed)

@@ -132,7 +132,7 @@ def test_nothing_is_poured_into_a_bench_test():
 
 @pytest.mark.parametrize("seed", [-1, 1.5])
 def test_a_seed_that_is_none_is_one_line(scene, seed):
-    with pytest.raises(ValueError, match=f"^seed {seed}: allowed: a whole number from 0 on$"):
+    with pytest.raises(ValueError, match=f"^seed {seed}: allowed: a whole number from 0 on, below 2\\^63$"):
         explorer.pour(scene, seed=seed)
 
 
@@ -264,7 +264,17 @@ def test_what_is_in_the_store_is_not_poured_again(swept, scene, monkeypatch):
         ({"rig.mass": np.int64(20)}, {}, "rig.mass: 20 kg"),
         ({"rig.mass": None}, {}, "rig.mass: None"),
         ({}, {"seeds": [1, -1]}, "seed -1: allowed: a whole number from 0 on"),
-        ({}, {"seeds": -1}, "seed -1: allowed: a whole number from 0 on"),
+        ({}, {"seeds": -1}, "seeds -1: allowed: a number of seeds from 1 on"),
+        ({}, {"seeds": 0}, "seeds 0: allowed: a number of seeds from 1 on"),
+        ({}, {"seeds": []}, r"seeds \[\]: allowed: a number of seeds from 1 on"),
+        ({}, {"seeds": 2.5}, "seeds 2.5: allowed: a number of seeds from 1 on"),
+        ({}, {"seeds": [3, 4, 3]}, "seeds: 3 is there 2 times"),
+        ({}, {"seeds": [np.nan]}, "seed nan: allowed: a whole number from 0 on"),
+        ({}, {"seeds": [np.inf]}, "seed inf: allowed: a whole number from 0 on"),
+        ({}, {"seeds": [2**63]}, "seed 9223372036854775808: allowed: a whole number from 0 on, below"),
+        ({"rig.mass": []}, {}, "rig.mass: no values"),
+        ({}, {"workers": 0}, "workers 0: allowed: a whole number from 1 on"),
+        ({}, {"workers": -1}, "workers -1: allowed: a whole number from 1 on"),
     ],
 )
 def test_a_sweep_is_refused_before_anything_is_poured(scene, tmp_path, values, options, told):

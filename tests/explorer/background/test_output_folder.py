@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from explorer.background.output_folder import kept_for_one
+from explorer.background.output_folder import ResultFile, checked_folder, kept_for_one
 from explorer.errors import CommandError
 
 AT_WORK = """
@@ -31,3 +31,16 @@ def test_a_second_command_is_refused_while_the_first_is_at_work_and_a_killed_one
         assert folder.is_dir()
     with kept_for_one(folder):
         pass
+
+
+def test_an_error_of_the_command_itself_is_not_told_as_that_of_another_one(tmp_path):
+    """Such as that of a full pipe that nobody waits for."""
+    with pytest.raises(BlockingIOError, match="write could not complete"), kept_for_one(tmp_path / "out"):
+        raise BlockingIOError(11, "write could not complete without blocking")
+
+
+def test_a_result_of_brackets_without_end_is_one_line(tmp_path):
+    (tmp_path / "result.json").write_text("[" * 100_000)
+    assert ResultFile("result.json").read(tmp_path) is None
+    with pytest.raises(CommandError, match=r"result\.json: cannot be read"):
+        checked_folder(str(tmp_path), "result.json")

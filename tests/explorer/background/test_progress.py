@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -79,3 +80,14 @@ def test_a_process_that_goes_on_is_told_so():
         os.kill(os.getpid(), signal.SIGCONT)
     assert told == [1]
     assert signal.getsignal(signal.SIGCONT) == before
+
+
+def test_a_study_may_run_in_another_thread():
+    """As in a notebook that goes on meanwhile; only the main thread can be told of a pause."""
+
+    def work():
+        with told_of_pauses(lambda: None):
+            return "done"
+
+    with ThreadPoolExecutor() as threads:
+        assert threads.submit(work).result() == "done"

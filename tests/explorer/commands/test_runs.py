@@ -70,3 +70,9 @@ def test_older_stores_beside_the_default_one_are_named(path, monkeypatch):
     assert "notes.sqlite: cannot be used" in result.stderr
     last = result.stdout.splitlines()[-1]
     assert last.startswith(f"runs.sqlite: physics {PHYSICS}; `--store ")
+
+
+@pytest.mark.parametrize("options", [(), ("--csv",)])
+def test_a_study_that_the_store_does_not_have_is_refused(path, options):
+    told = refused(explorer("runs", "--store", path, "--study", "lentils", *options))
+    assert f"--study lentils: no runs of it in {path}" in told

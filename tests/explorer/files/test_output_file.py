@@ -1,5 +1,7 @@
 """What a command makes is refused before any work where it cannot be made, in one line that names the option."""
 
+import os
+
 import pytest
 
 from explorer.errors import CommandError
@@ -63,3 +65,21 @@ def test_a_file_that_cannot_be_put_in_place_leaves_no_part(folder):
     with pytest.raises(OSError, match="taken"):
         write_whole(folder / "taken", "text")
     assert sorted(folder.iterdir()) == before
+
+
+def test_a_link_stays_one_and_what_it_names_is_written(folder):
+    (folder / "link.txt").symlink_to("mine.txt")
+    write_whole(folder / "link.txt", "new")
+    assert (folder / "link.txt").is_symlink()
+    assert (folder / "mine.txt").read_text() == "new"
+
+
+def test_a_pipe_is_written_and_left_in_its_place(folder):
+    """As --summary /dev/stdout is, which a file would take the place of where root runs the command."""
+    pipe = folder / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    write_whole(pipe, "told")
+    assert os.read(reader, 100) == b"told"
+    os.close(reader)
+    assert pipe.is_fifo()

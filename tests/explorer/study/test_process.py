@@ -100,6 +100,14 @@ def test_a_study_that_fails_says_why(tmp_path):
     assert status.message == "calibrate ended with exit code 1: error: body.seed: no such body"
 
 
+def test_a_study_that_was_killed_says_so_and_not_its_last_line_as_the_reason(tmp_path):
+    process = study(tmp_path, "print('scan: 3 of 90 runs', flush=True); import signal; signal.raise_signal(9)")
+    process.start("quick")
+    wait_for(lambda: process.status().state != "running")
+    killed = "calibrate was ended from outside, or for want of memory (signal 9); its last line: scan: 3 of 90 runs"
+    assert process.status().message == killed
+
+
 def test_a_study_whose_output_was_taken_away_fails_in_one_line(tmp_path):
     process = study(tmp_path, "pathlib.Path(f'{out}.log').unlink(); sys.exit(1)")
     process.start("quick")

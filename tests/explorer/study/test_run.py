@@ -17,7 +17,8 @@ from explorer.background.reporter import LOG
 from explorer.photograph.target import FOLDER, load_target, remove_target
 from explorer.report import folder
 from explorer.study import run as study_run
-from solver import asset_path
+from explorer.study.process import PARTIAL, RESULT
+from solver import asset_path, unpacked
 from solver.pours.record import Spheres
 from tests.doe.formula_runner import FormulaRunner
 from tests.doe.studies.test_campaign import planted
@@ -107,6 +108,20 @@ def test_a_folder_that_is_not_empty_needs_resume(tmp_path):
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["notes.txt"]
     assert calibrate(tmp_path, "--resume").exit_code == 0
     assert (tmp_path / "out" / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.usefixtures("formula")
+@pytest.mark.parametrize("kept", [RESULT, PARTIAL])
+def test_what_another_study_has_found_is_not_overwritten(tmp_path, kept):
+    (tmp_path / "out").mkdir()
+    found = tmp_path / "out" / kept
+    found.write_text('{"schema": 1, "study": {"name": "lentils"}}')
+    refused = calibrate(tmp_path, "--resume")
+    assert (refused.exit_code, refused.stderr.count("\n")) == (2, 1)
+    assert "holds the study lentils, not sunflower_extract; name another folder" in refused.stderr
+    assert [one.name for one in found.parent.iterdir()] == [kept]
+    found.write_text('{"schema": 1, "study": {"name": "sunflower_extract"}}')
+    assert calibrate(tmp_path, "--resume").exit_code == 0
 
 
 @pytest.mark.usefixtures("formula")
@@ -269,10 +284,17 @@ def test_piles_of_reference_and_optimum_are_read_off_the_store(monkeypatch):
     ]
     spheres = Spheres(np.array(places), np.full(len(places), small), np.arange(len(places)))
     record = SimpleNamespace(pile=SimpleNamespace(spheres=spheres))
-    monkeypatch.setattr(study_run, "unpacked", lambda raw: record)
-    kept = SimpleNamespace(find=lambda key: SimpleNamespace(raw=b"kept") if key != "lost" else None)
+
+    def read(raw):
+        return record if raw == b"kept" else unpacked(raw)
+
+    monkeypatch.setattr(study_run, "unpacked", read)
+    raws = {"a": b"kept", "b": b"kept", "damaged": b"no archive"}
+    kept = SimpleNamespace(find=lambda key: SimpleNamespace(raw=raws[key]) if key in raws else None)
     run = reported_studies.typed(reported_studies.result_of_case("planted")).verification.runs[0]
-    runs = [dataclasses.replace(run, label="reference", outcome="at_rest", key=key) for key in ("a", "b", "lost")]
+    runs = [
+        dataclasses.replace(run, label="reference", outcome="at_rest", key=key) for key in ("a", "b", "lost", "damaged")
+    ]
     jammed = dataclasses.replace(run, label="reference", outcome="jammed", key="jammed")
     elsewhere = dataclasses.replace(runs[0], experiment="drum")
     rows = {"pilot": ((*runs, jammed, elsewhere),)}

@@ -134,3 +134,26 @@ def test_what_cannot_be_read_is_one_clear_line(change, words):
 def test_damaged_bytes_are_one_clear_line(raw):
     with pytest.raises(RawPourError, match="not a raw pour, or a damaged one"):
         unpacked(raw)
+
+
+def changed(raw, **arrays):
+    with np.load(io.BytesIO(raw)) as file:
+        kept = {name: file[name] for name in file.files} | arrays
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **{name: array for name, array in kept.items() if array is not None})
+    return buffer.getvalue()
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"mass": None},
+        {"position": np.zeros((3, 3), dtype=np.int32)},
+        {"head": np.frombuffer(b"[]", dtype=np.uint8)},
+        {"head": np.frombuffer(b'{"format": 1}', dtype=np.uint8)},
+    ],
+)
+def test_an_archive_that_lacks_something_is_no_raw_pour(damage):
+    raw = (RAW_POURS / "trefoils.npz").read_bytes()
+    with pytest.raises(RawPourError, match="not a raw pour, or a damaged one"):
+        unpacked(changed(raw, **damage))

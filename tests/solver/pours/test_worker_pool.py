@@ -5,13 +5,14 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections import deque
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from solver import load_material, with_values
+from solver import ParameterError, load_material, with_values
 from solver.pours import worker_pool
 from solver.pours.run import Job, run_pours
 from solver.pours.worker_pool import PourBrokeOff, Room, Rooms, WorkerLost, WorkerPool, deaf_to_interrupts
@@ -102,6 +103,37 @@ def test_nothing_is_left_after_close():
     ((process, _),) = pool._processes
     pool.close()
     assert process.exitcode == 0
+
+
+@pytest.mark.parametrize("workers", [0, -1, 1.5])
+def test_less_than_one_worker_is_refused(workers):
+    """None at all would let the queue wait for ever."""
+    with pytest.raises(ParameterError, match=f"workers {workers}: allowed: a whole number from 1 on"):
+        WorkerPool(workers)
+
+
+LONG = """
+import sys
+from collections import deque
+from solver import Job, load_material, with_values
+from solver.pours.worker_pool import WorkerPool
+scene = with_values(load_material("sunflower_extract"), {"rig.mass": 0.003, "body.spheres": "coarse"})
+short = with_values(scene, {"numerics.max_time": 0.1})
+long = with_values(scene, {"rig.mass": 0.3, "numerics.duration": 60.0, "numerics.max_time": 60.0})
+with WorkerPool(1) as pool:
+    for job, _ in pool.run_queue(deque([Job(short, 1), Job(long, 2)]), [scene, long]):
+        print(job.seed, flush=True)
+"""
+
+
+def test_a_worker_does_not_outlive_the_process_in_charge_by_its_pour():
+    """It would go on for minutes, and hold what it has inherited: the lock of the output folder, and here a pipe."""
+    in_charge = subprocess.Popen([sys.executable, "-c", LONG], stdout=subprocess.PIPE, text=True)
+    assert in_charge.stdout is not None
+    assert in_charge.stdout.readline() == "1\n"
+    time.sleep(0.5)
+    in_charge.kill()
+    in_charge.communicate(timeout=20.0)
 
 
 def hears_interrupts(pipe):
