@@ -51,8 +51,8 @@ NECK, STEADY = 1.25, 0.9
 """Width of the end of a tip over that where it is thinnest, and of its beginning over that."""
 LEAST_NECK = 0.15
 """Of the height: a body that sticks out of the apex is shorter."""
-ROUND_END = 0.1
-"""Share of a tip, from its upper end, by which a body on the apex has not come to its width yet."""
+LONGER = 1.5
+"""Times as long as it is thick: a body on the apex is about as high as wide, the tips found are over three times."""
 THINNEST = 0.3
 """Of the width of the pile: a tip is thinner."""
 THIN, LONG = 0.15, 0.12
@@ -130,7 +130,7 @@ def severed(part: Image) -> Image | None:
         return None
     neck = width[tip[-1] - long : tip[-1] + 1].min()
     last = int(np.flatnonzero(width[:widest] <= NECK * neck)[-1])
-    if last + 8 > rows.size or width[round(ROUND_END * last)] < STEADY * neck:
+    if last + 8 > rows.size or last < LONGER * neck:
         return None
     cut = part.copy()
     cut[: rows[last] + 1] = False
