@@ -35,6 +35,6 @@ def test_bodies_campaign():
     """Against the fit of the noise-free silhouette: intervals hold in 90 % and more."""
     found = summary([bodies_trial(seed, (500, 800, 1200, 2400)) for seed in range(200)])
     print(found)
-    assert found["refused"] <= 10
+    assert found["refused"] <= 12  # since 2026-11-26 flanks whose thirds lie far apart are refused as bent: two more
     assert found["flanks_held"] >= 0.9
     assert found["mean_held"] >= 0.9
