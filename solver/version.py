@@ -1,6 +1,6 @@
 """The versions of what a pour does and of how member spheres are fitted: raised by hand, held to by golden bits."""
 
-PHYSICS = 2
+PHYSICS = 3
 """Raise it with every change to the bits of any pour, and never otherwise: it is part of every stored pour's key.
 A change that only pours with one effect see raises that effect's ``revision`` instead, and theirs alone are anew.
 

@@ -96,6 +96,10 @@ class ContactEffect(Effect):
         """How far apart [m] surfaces may come before it lets go; 0 for one that needs an overlap."""
         return 0.0
 
+    def restitution(self, declared: float, speed: float) -> float:
+        """Restitution of an impact at ``speed`` [m/s] where ``declared`` is; the time step follows it."""
+        return declared
+
     @property
     def stiffening(self) -> float:
         """Factor by which it raises the contact stiffness; the time step goes with its inverse root."""

@@ -21,6 +21,8 @@ from solver.laws.restitution import normal_damping
 from solver.params import param
 
 DEGREE = 20
+LEAST = 0.05
+"""Restitution that no speed takes a contact below."""
 
 
 def _series() -> tuple[float, ...]:
@@ -49,7 +51,7 @@ def damp_by_speed(p, m, c):
     if c.before == 0.0:
         speed = ti.max(1e-4, -c.v_n) / p[1]
         loss = (1.0 - c.restitution) * (1.0 + p[0] * (speed**0.2 - 1.0))
-        now = ti.max(0.05, ti.min(1.0, 1.0 - loss))
+        now = ti.max(LEAST, ti.min(1.0, 1.0 - loss))
         if c.restitution < 1.0:
             m[0] = damping_of(now) / damping_of(c.restitution) - 1.0
     c.damper *= 1.0 + m[0]
@@ -76,3 +78,8 @@ class VelocityDependentRestitution(ContactEffect):
     stage = Stage.NORMAL
     act = staticmethod(damp_by_speed)
     memory = 1
+
+    def restitution(self, declared: float, speed: float) -> float:
+        """e(v)."""
+        loss = 1.0 + self.speed_sensitivity * ((speed / self.reference_speed) ** 0.2 - 1.0)
+        return max(LEAST, min(1.0, 1.0 - (1.0 - declared) * loss))

@@ -42,6 +42,11 @@ class ContactLaw:
     refuses: ClassVar[tuple[str, ...]] = ()
     """Effects that assume another law, by name."""
 
+    landing_step: ClassVar[float] = 1.0
+    """Step of an undamped landing, in steps of a Hertzian one (``scenes/time_step.py``)."""
+    damped_landing: ClassVar[float] = 4.0
+    """How much dampings shorten it: (1 + ``damped_landing`` N β⁴)^-½."""
+
     scale: ClassVar[KernelCall]
     """``scale(law, reduced_radius, reduced_mass)``: what the law takes of R* [m] and m* [kg]; a number."""
     normal_spring_force: ClassVar[KernelCall]

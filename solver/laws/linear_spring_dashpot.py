@@ -114,6 +114,10 @@ class LinearSpringDashpot(ContactLaw):
     """The first three replace Hertz's force by one that begins with it; a bridge holds surfaces at a gap, where a
     contact radius no longer switches the dashpots off."""
 
+    landing_step = 0.7
+    damped_landing = 10.0
+    """Its dashpot acts in full from the touch on."""
+
     scale = staticmethod(spring_constant)
     normal_spring_force = staticmethod(normal_spring_force)
     normal_damper = staticmethod(normal_damper)

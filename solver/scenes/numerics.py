@@ -18,7 +18,7 @@ class Numerics:
 
     rayleigh_fraction: float = param(0.3, low=0.02, high=0.6, doc="Time step as a fraction of the Rayleigh time.")
     impact_fraction: float = param(
-        0.35, low=0.02, high=1.0, doc="Time step times the frequency of a body's far end pressed by a 2 m/s impact."
+        0.35, low=0.02, high=1.0, doc="Time step times the frequency of an undamped impact at 2 m/s."
     )
     skin: float = param(1.0e-3, unit="m", low=1e-5, high=2e-2, doc="Reach of the contact list beyond touching.")
     rest_speed: float = param(
@@ -49,7 +49,7 @@ class Numerics:
         doc="A pour is read this long after its first body entered, at rest or not; 0: when it is at rest.",
     )
     overlap_limit: float = param(
-        0.1, low=0.001, high=0.5, doc="Largest overlap allowed, as a fraction of the member sphere's radius."
+        0.1, low=0.001, high=0.5, doc="Largest overlap allowed, as a fraction of the smaller member sphere's radius."
     )
     sample_interval: float = param(
         0.01, unit="s", low=1e-3, high=0.1, doc="Simulated time between two samples of the curves."

@@ -59,7 +59,7 @@ def test_pours_are_stored_reused_and_replaced(tmp_path):
     scene = with_values(load_material("sunflower_extract"), TINY | {"rig.mass": "8g"})
     store = Store(tmp_path / "runs.sqlite")
     seen = []
-    runner = PourRunner(scene, store, "test", 1, on_run=lambda stage, run, left: seen.append((run, left)))
+    runner = PourRunner(scene, store, "test", 4, on_run=lambda stage, run, left: seen.append((run, left)))
     settings = [
         Setting("good", {}, 2),
         Setting("never at rest", {"numerics.max_time": 0.1}, 1),
@@ -78,7 +78,7 @@ def test_pours_are_stored_reused_and_replaced(tmp_path):
 
     # The whole design once, then again; a replicate may be given more seeds later.
     assert [run.label for run, _ in seen[-5:]] == ["good", *["never at rest"] * TRIES, "good"]
-    more = PourRunner(scene, store, "test", 1, tries=TRIES + 1).run("stage", settings)
+    more = PourRunner(scene, store, "test", 4, tries=TRIES + 1).run("stage", settings)
     assert [run.attempt for run in more[1]] == list(range(TRIES + 1))
     assert [run.reused for run in more[1]] == [True] * TRIES + [False]
 

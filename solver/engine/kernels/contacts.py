@@ -212,9 +212,12 @@ def push(s: ti.template(), w):
         overlap = hit[3]
         if lasts(s, w, k, overlap):
             a, b, i = s.contact.a[w, k], s.contact.b[w, k], s.contact.i[w, k]
-            radius = s.member.radius[w, i]
-            if item < live and overlap > largest * radius:
-                largest = overlap / radius
+            if item < live:
+                radius = s.member.radius[w, i]
+                if b >= 0:
+                    radius = ti.min(radius, s.member.radius[w, s.contact.j[w, k]])
+                if overlap > largest * radius:
+                    largest = overlap / radius
             n = Vec3(hit[0], hit[1], hit[2])
             point = contact_point(s, w, i, n, overlap)
             arm, other_arm = point - s.body.position[w, a], Vec3(0.0, 0.0, 0.0)

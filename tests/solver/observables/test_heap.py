@@ -36,7 +36,7 @@ def stacked(layers):
 
 @pytest.fixture(scope="module")
 def layer(taichi):
-    return run_pour(two_layers(), 3)
+    return run_pour(two_layers(), 7)
 
 
 def test_two_layers_of_beans_are_no_heap_whatever_angle_they_are_read_at(layer):

@@ -144,7 +144,7 @@ def test_in_free_fall_a_pull_is_an_acceleration_and_its_work_is_counted():
 
 def disturbed(at_most=None):
     """A heap that was shaken and one of whose bodies is pulled, in the middle of both."""
-    pour = drive(Pour(Batch(capacity_for([HEAP], 1)), 0, HEAP, 5), until=0.4, at_most=at_most)
+    pour = drive(Pour(Batch(capacity_for([HEAP], 1)), 0, HEAP, 3), until=0.4, at_most=at_most)
     pour.move_plate(SHAKE)
     pour.pull(Pull(3, (0.0, 0.0, 5e-3)))
     return drive(pour, until=pour.time + 0.05, at_most=at_most)
@@ -164,7 +164,7 @@ def test_a_moment_within_a_shake_and_a_pull_repeats_whatever_the_launches():
 
 
 def test_brought_back_before_it_nothing_was_disturbed():
-    pour = drive(Pour(Batch(capacity_for([HEAP], 1)), 0, HEAP, 5), until=0.4)
+    pour = drive(Pour(Batch(capacity_for([HEAP], 1)), 0, HEAP, 3), until=0.4)
     kept = keep(pour)
     plain = drive(pour, until=0.7).record()
     put_back(pour, kept)
