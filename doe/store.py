@@ -294,11 +294,12 @@ class Store:
         try:
             values["parameters"] = json.loads(values["parameters"])
             values["observables"] = json.loads(values["observables"])
+            Outcome(values["outcome"])
             if not all(isinstance(values[name], kind) for name, kind in KEPT_AS.items()):
                 raise TypeError
         except (TypeError, ValueError, RecursionError):
             raise StoreError(
-                f"{self.path}: run {str(values['key'])[:12]}: its parameters, readings or raw pour cannot be read"
+                f"{self.path}: run {str(values['key'])[:12]}: its parameters, outcome, readings or raw pour cannot be read"
             ) from None
         return StoredRun(**values)
 
@@ -323,7 +324,8 @@ _COLUMNS_BEFORE_RAW_POURS = ", ".join(_ABSENT.get(name, name) for name in _NAMES
 
 def write_csv(runs: Iterable[StoredRun], file: IO[str]) -> int:
     """Write runs as CSV, one column per parameter and observable that occurs; returns the number of rows."""
-    rows = list(runs)
+    # Raw pours take a hundred times the room of what is written.
+    rows = [dataclasses.replace(run, raw=b"") for run in runs]
     parameters = sorted({name for run in rows for name in run.parameters})
     observables = sorted({name for run in rows for name in run.observables})
     fixed = ["study", "stage", "label", "seed", "outcome", "message", "dt", "steps", "wall_s", "physics", "readings"]

@@ -83,6 +83,8 @@ def _file_of(source: str) -> Path:
     for kind in SHIPPED:
         if stem in shipped_assets(kind):
             return asset_path(kind, stem)
+    if own.is_dir():
+        raise ParameterError(f"{source}: a folder without the result.json of a finished calibration")
     rigs, materials, studies, benchmarks, scenes = map(", ".join, (SOURCES, *map(shipped_assets, SHIPPED)))
     raise ParameterError(
         f"{source}: no such file, and no rig ({rigs}), shipped material ({materials}), study ({studies}), "

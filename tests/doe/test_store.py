@@ -162,7 +162,9 @@ def test_a_run_whose_parameters_are_damaged_is_one_line_with_the_file(store, tmp
     with closing(sqlite3.connect(tmp_path / "runs.sqlite")) as db, db:
         db.execute("UPDATE pours SET parameters = 'no JSON'")
     for read in (lambda: store.find("k1"), lambda: list(store.runs())):
-        with pytest.raises(StoreError, match=r"runs\.sqlite: run k1: its parameters, readings or raw pour cannot"):
+        with pytest.raises(
+            StoreError, match=r"runs\.sqlite: run k1: its parameters, outcome, readings or raw pour cannot"
+        ):
             read()
 
 

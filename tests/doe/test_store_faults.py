@@ -105,9 +105,13 @@ def test_an_empty_file_becomes_a_store(tmp_path):
     [
         ("DELETE FROM store", "does not say of which physics it is"),
         ("UPDATE store SET physics = 'two'", "does not say of which physics it is"),
-        ("UPDATE pours SET observables = '[]'", "run k1: its parameters, readings or raw pour cannot be read"),
-        ("UPDATE pours SET parameters = 'null'", "run k1: its parameters, readings or raw pour cannot be read"),
-        ("UPDATE pours SET raw = 'text'", "run k1: its parameters, readings or raw pour cannot be read"),
+        ("UPDATE pours SET observables = '[]'", "run k1: its parameters, outcome, readings or raw pour cannot be read"),
+        (
+            "UPDATE pours SET parameters = 'null'",
+            "run k1: its parameters, outcome, readings or raw pour cannot be read",
+        ),
+        ("UPDATE pours SET outcome = 'gone'", "run k1: its parameters, outcome, readings or raw pour cannot be read"),
+        ("UPDATE pours SET raw = 'text'", "run k1: its parameters, outcome, readings or raw pour cannot be read"),
     ],
 )
 def test_a_store_changed_by_hand_is_one_line(tmp_path, change, says):

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from explorer.cli import app
 from explorer.errors import CommandError
-from explorer.scene.file import study_path, with_settings
+from explorer.scene.file import load_scene, study_path, with_settings
 from explorer.scene.source import (
     Difference,
     SceneSource,
@@ -20,6 +20,7 @@ from explorer.scene.source import (
     study_source,
 )
 from explorer.scene.text import material_toml
+from solver.params import ParameterError
 from solver.rigs import RIGS
 from solver.scenes.scene import value, with_rig, with_values
 
@@ -141,3 +142,12 @@ def test_settings_of_the_command_line_are_counted_from_what_was_loaded(asked):
     line = command_line(SUNFLOWER, scene, 1)
     assert "--set rig.mass=12g" in line
     assert value(repeated(line, asked).scene, "rig.mass") == value(scene, "rig.mass")
+
+
+def test_a_folder_of_no_finished_calibration_is_told_so_and_hides_no_shipped_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "results").mkdir()
+    (tmp_path / "soybean").mkdir()
+    with pytest.raises(ParameterError, match=r"^results: a folder without the result\.json of a finished calibration$"):
+        load_scene("results")
+    assert load_scene("soybean").bodies
