@@ -298,8 +298,9 @@ class Store:
             if not all(isinstance(values[name], kind) for name, kind in KEPT_AS.items()):
                 raise TypeError
         except (TypeError, ValueError, RecursionError):
+            key = str(values["key"])[:12]
             raise StoreError(
-                f"{self.path}: run {str(values['key'])[:12]}: its parameters, outcome, readings or raw pour cannot be read"
+                f"{self.path}: run {key}: its parameters, outcome, readings or raw pour cannot be read"
             ) from None
         return StoredRun(**values)
 
