@@ -11,7 +11,7 @@ from solver.engine.tables import body_tables
 from solver.engine.world import Batch
 from solver.rigs import Funnel
 from solver.scenes.material import Pair
-from solver.single_body.free_world import GRAIN, ROOM, WALL, grain_on_plate, scene_of, sphere
+from solver.single_body.free_world import GRAIN, ROOM, WALL, FreeWorld, grain_on_plate, scene_of, sphere
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
@@ -71,3 +71,15 @@ def test_a_scene_of_more_contact_classes_than_the_batch_has_is_refused():
     bodies = body_tables(scene, np.zeros(3, dtype=np.int32))
     with pytest.raises(ValueError, match=f"{ROOM.kinds + 1} kinds do not fit into a batch of {ROOM.kinds}"):
         Batch(ROOM).load(0, scene, bodies, DT, (True,) * len(scene.rig.surfaces()))
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_the_overlap_of_unequal_spheres_is_a_share_of_the_smaller_one(order):
+    """1 mm by 0.2 mm into 20 mm: 0.2, whichever entered first (it was 0.01 where the large one did)."""
+    radii, deep = (20e-3, 1e-3), 0.2e-3
+    bodies = tuple(sphere(radius, name=f"r{radius:g}") for radius in radii)
+    pairs = (Pair("grain", "grain", 0.3, 0.5), Pair("grain", "wall", 0.3, 0.5))
+    lab = FreeWorld(scene_of(bodies, (GRAIN, WALL), pairs), order, plate=False)
+    for b, kind in enumerate(order):
+        lab.put(b, (kind * (sum(radii) - deep), 0.0, 0.5))
+    assert lab.run(1)["overlap"] == pytest.approx(0.2, rel=1e-6)

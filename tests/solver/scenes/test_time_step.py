@@ -128,3 +128,11 @@ def test_spheres_that_land_together_are_those_of_a_face():
         members = Members(tuple(map(tuple, centres)), (1e-3,) * len(centres), 1e-4, (1e-9,) * 3)
         body = Body("body", "grain", 1.0, members, GRAIN.density)
         assert landing_together(body.clump, 1e-5) == spheres
+
+
+def test_an_effect_that_takes_more_of_a_fast_impact_shortens_the_step():
+    flat = grain_on_plate(side_by_side(16), restitution=0.5)
+    steep = {"effect.velocity_dependent_restitution.speed_sensitivity": 3.0}
+    lost = grain_on_plate(side_by_side(16), restitution=1.0 - 0.5 * (1.0 + 3.0 * (2.0**0.2 - 1.0)))
+    assert time_step(with_values(flat, steep)) == pytest.approx(time_step(lost), rel=1e-12)
+    assert time_step(lost) < 0.8 * time_step(flat)
