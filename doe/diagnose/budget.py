@@ -16,7 +16,7 @@ class Budget:
     """How many pours a diagnosis takes for its models, in each condition."""
 
     base: int = 24
-    screening: int = 4
+    screening: int = 6
     """Of each direction of an effect."""
     more: int = 8
     """At each look, of what stays in question."""
