@@ -11,10 +11,10 @@ k is the stiffness dF/dδ of the contact law at the overlap that an impact at 2 
 pair, and m_eff the mass that a body shows at r along a direction u, 1/m_eff = 1/m + (r × u)ᵀ I⁻¹ (r × u), for the
 worst u. A dashpot knows its own force at the end of the step and that of the others by the last one, so of N that
 act at once N − 1 are late, and many strong ones gain energy: the root keeps that off. (A dashpot at a tip damps with
-the whole mass, and counts m/m_eff times.) l and d are the contact
-law's; they are fitted to landings of 1 to 38 spheres with e = 0.05 … 0.9, of which all miss the exact speed by less
-than 0.015 of the impact's (solver/README.md, *Time step*). That the stable step of a central difference falls with the
-number of contacts and with damping: O'Sullivan & Bray 2004 (doi:10.1108/02644400410519794).
+the whole mass, and counts m/m_eff times.) l and d, ``landing_step`` and ``damped_landing`` of the contact law, are
+fitted to landings of 1 to 38 spheres with e = 0.05 … 0.9, which all miss the exact speed by less than 0.015 of the
+impact's (solver/README.md, *Time step*). That the stable step of a central difference falls with the number of
+contacts and with damping: O'Sullivan & Bray 2004 (doi:10.1108/02644400410519794).
 
 f is ``numerics.rayleigh_fraction``, b ``numerics.impact_fraction``. With f = 1 and b = 2 (leapfrog: ω dt < 2), they
 are the limit of stability. All are proportional to the size of a body, so the smallest that its distribution of sizes
