@@ -23,8 +23,10 @@ Diedrichsen et al. 2016, arXiv 1607.01371, eq. 9):
 
     d² = [ (Σ_f δ_f)ᵀ M (Σ_f δ_f) − Σ_f δ_fᵀ M δ_f ] / (F (F − 1))
 
-Its standard error is the jackknife's over folds and, in quadrature, d/√(2 df), for Σ is itself estimated. Σ is shrunk
-to its diagonal as far as its own scatter asks for (Schäfer & Strimmer 2005, doi 10.2202/1544-6115.1175).
+Its standard error is that of two jackknives over the folds in quadrature: of the shift in a metric that stands, and of
+the metric, whose Σ and J are estimated as well, under a shift that stands (the mean and the covariance of normal pours
+are independent). Σ is shrunk to its diagonal as far as its own scatter asks for (Schäfer & Strimmer 2005, doi
+10.2202/1544-6115.1175).
 """
 
 from __future__ import annotations
@@ -34,6 +36,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import block_diag
 from scipy.special import logsumexp
 from scipy.stats import norm
 
@@ -67,17 +70,21 @@ CLASS = 0.95
 
 @dataclass(frozen=True)
 class Metric:
-    """``whitening`` W with M = Wᵀ W, so that shifts in its units have unit noise, (D, D).
-
-    ``freedom``: degrees of freedom of the covariance that it is made of.
-    """
+    """``whitening`` W with M = Wᵀ W, so that shifts in its units have unit noise; (k, D), zero where nothing varies."""
 
     whitening: FloatArray
-    freedom: int
 
     def white(self, shifts: FloatArray) -> FloatArray:
         """Shifts (..., D) in standard errors of a data set."""
         return np.asarray(shifts @ self.whitening.T, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Ruler:
+    """The ``metric`` of all reference pours, and, for its error, those ``without`` each of the folds."""
+
+    metric: Metric
+    without: tuple[Metric, ...]
 
 
 @dataclass(frozen=True)
@@ -231,10 +238,10 @@ def limit_study(
     names = [f"{one.name} strong" for one in kinds]
     samples = {data: sample.first(numbers).varying() for data, numbers in offered.items()}
     scalars = next(iter(samples.values()))
-    metric = metric_of(scalars)
-    ruler = [strength_of(scalars, name, metric) for name in names]
+    scale = ruler_of(scalars)
+    ruler = [strength_of(scalars, name, scale) for name in names]
     halves = [f"{one.name} weak" for one in kinds]
-    weak = [strength_of(scalars, half, metric) if half in sample.pours else None for half in halves]
+    weak = [strength_of(scalars, half, scale) if half in sample.pours else None for half in halves]
     by_data: dict[str, tuple[Strength, ...]] = {}
     confusable, rows = [], []
     for data, one in samples.items():
@@ -312,12 +319,17 @@ def signatures_of(
 
     ``ruler``: their strengths on the ruler. ``replicates``: pours of a data set in each condition.
     """
-    metric = metric_of(sample, replicates)
-    shifts = [fold_shifts(sample, name, metric) for name in names]
-    strengths = tuple(strength_of(sample, name, metric) for name in names)
+    scale = ruler_of(sample, replicates)
+    shifts = [scale.metric.white(fold_shifts(sample, name)) for name in names]
+    strengths = tuple(strength_of(sample, name, scale) for name in names)
     gram = np.array([[product(a, b) for b in shifts] for a in shifts])
     size = np.sqrt(np.maximum(np.diag(gram), 1e-6))
     return Signatures(tuple(names), tuple(ruler), strengths, nearest_correlation(gram / np.outer(size, size)))
+
+
+def ruler_of(sample: ReferencePours, replicates: int = REPLICATES) -> Ruler:
+    """The ruler of data sets of ``replicates`` pours per condition, as :func:`metric_of`."""
+    return Ruler(metric_of(sample, replicates), tuple(metric_of(_without(sample, f), replicates) for f in range(FOLDS)))
 
 
 def metric_of(sample: ReferencePours, replicates: int = REPLICATES) -> Metric:
@@ -339,41 +351,39 @@ def metric_of(sample: ReferencePours, replicates: int = REPLICATES) -> Metric:
     StatisticsError
         Where a condition has fewer than three pours of the base model.
     """
-    sensitivity = np.column_stack(
-        [_slope(sample, name) for name in sample.parameters] or [np.zeros((_size(sample), 0))]
-    )
-    covariance = np.zeros((_size(sample), _size(sample)))
-    first, freedom = 0, sum(len(block) for block in sample.pours["base"])
     for c, base in enumerate(sample.pours["base"]):
         if len(base) < 3:
             raise StatisticsError(f"base: {len(base)} pours of condition {c + 1}; allowed: at least 3")
-        last = first + base.shape[1]
-        residuals, groups = _residuals(sample, c)
-        covariance[first:last, first:last] = shrunk_covariance(residuals) / replicates
-        freedom = min(freedom, len(residuals) - groups)
-        first = last
-    covariance += sensitivity @ sensitivity.T
+    varying = np.concatenate(sample.vary())
+    sample = sample.varying()
+    sensitivity = np.column_stack(
+        [_slope(sample, name) for name in sample.parameters] or [np.zeros((_size(sample), 0))]
+    )
+    blocks = [shrunk_covariance(_residuals(sample, c)) for c in range(len(sample.pours["base"]))]
+    covariance = block_diag(*blocks) / replicates + sensitivity @ sensitivity.T
     # In units of each feature's standard error: they span ten orders of magnitude.
     scale = np.sqrt(np.diag(covariance))
     factor = np.linalg.cholesky(covariance / np.outer(scale, scale))
-    return Metric(np.linalg.inv(factor) / scale, freedom)
+    whitening = np.zeros((len(scale), len(varying)))
+    whitening[:, varying] = np.linalg.inv(factor) / scale
+    return Metric(whitening)
 
 
-def strength_of(sample: ReferencePours, name: str, metric: Metric) -> Strength:
+def strength_of(sample: ReferencePours, name: str, ruler: Ruler) -> Strength:
     """Length of the shift by ``name``, zero where its square comes out negative, with its standard error."""
-    shifts = fold_shifts(sample, name, metric)
-    folds = len(shifts)
-    square = product(shifts, shifts)
+    shifts = fold_shifts(sample, name)
+    white = ruler.metric.white(shifts)
+    square = product(white, white)
     value = float(np.sqrt(max(0.0, square)))
-    without = np.array([product(rest, rest) for f in range(folds) for rest in [np.delete(shifts, f, axis=0)]])
-    spread = float(np.sqrt((folds - 1) / folds * ((without - without.mean()) ** 2).sum()))
+    by_shift = _jackknife([product(one, one) for one in (np.delete(white, f, axis=0) for f in range(len(white)))])
+    by_metric = _jackknife([product(one, one) for one in (metric.white(shifts) for metric in ruler.without)])
+    spread = float(np.hypot(by_shift, by_metric))
     # Of the square; that of its root by the delta method, and of a root near zero by the root of that.
-    error = spread / (2.0 * value) if square > spread else float(np.sqrt(spread))
-    return Strength(value, float(np.hypot(error, value / np.sqrt(2.0 * metric.freedom))))
+    return Strength(value, spread / (2.0 * value) if square > spread else float(np.sqrt(spread)))
 
 
-def fold_shifts(sample: ReferencePours, name: str, metric: Metric, folds: int = FOLDS) -> FloatArray:
-    """Whitened shifts of ``name`` off the base model in each of the folds, (folds, D).
+def fold_shifts(sample: ReferencePours, name: str, folds: int = FOLDS) -> FloatArray:
+    """Shifts of ``name`` off the base model in each of the folds, features' units, (folds, D).
 
     Raises StatisticsError where a fold would be empty.
     """
@@ -383,7 +393,7 @@ def fold_shifts(sample: ReferencePours, name: str, metric: Metric, folds: int = 
     parts = []
     for there, base in zip(sample.pours[name], sample.pours["base"], strict=True):
         parts.append(_fold_means(there, folds) - _fold_means(base, folds))
-    return metric.white(np.concatenate(parts, axis=1))
+    return np.concatenate(parts, axis=1)
 
 
 def product(first: FloatArray, second: FloatArray) -> float:
@@ -421,21 +431,34 @@ def nearest_correlation(cosines: FloatArray) -> FloatArray:
     return np.asarray(symmetric, dtype=np.float64)
 
 
-def _residuals(sample: ReferencePours, condition: int) -> tuple[FloatArray, int]:
-    """Deviations from the mean of their kind, of base pours and of those with a parameter moved, and the kinds."""
+def _residuals(sample: ReferencePours, condition: int) -> FloatArray:
+    """Deviations from the mean of their kind, of base pours and of those with a parameter moved."""
     kinds = ["base", *(f"{name} {side}" for name in sample.parameters for side in "-+")]
     groups = [sample.pours[kind][condition] for kind in kinds]
     # Each group's mean takes a degree of freedom.
-    scaled = [
-        (group - group.mean(axis=0)) * np.sqrt(len(group) / (len(group) - 1)) for group in groups if len(group) > 1
-    ]
-    return np.concatenate(scaled), len(scaled)
+    return np.concatenate(
+        [(group - group.mean(axis=0)) * np.sqrt(len(group) / (len(group) - 1)) for group in groups if len(group) > 1]
+    )
 
 
 def _slope(sample: ReferencePours, parameter: str) -> FloatArray:
     """What ``parameter`` does per standard deviation of its measurement, (D,)."""
     low, high = sample.pours[f"{parameter} -"], sample.pours[f"{parameter} +"]
     return np.concatenate([(b.mean(axis=0) - a.mean(axis=0)) / (2.0 * SIDE) for a, b in zip(low, high, strict=True)])
+
+
+def _without(sample: ReferencePours, fold: int) -> ReferencePours:
+    """The pours that are not in ``fold``."""
+    pours = {
+        name: tuple(np.delete(block, np.s_[fold::FOLDS], axis=0) for block in blocks)
+        for name, blocks in sample.pours.items()
+    }
+    return ReferencePours(pours, sample.parameters)
+
+
+def _jackknife(values: Sequence[float]) -> float:
+    """Standard error of an estimate by its ``values`` without each of the folds."""
+    return float(np.std(values) * np.sqrt(len(values) - 1))
 
 
 def _fold_means(pours: FloatArray, folds: int) -> FloatArray:
