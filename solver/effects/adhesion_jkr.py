@@ -31,7 +31,7 @@ class AdhesionJKR(ContactEffect):
     strongest = 5.0
     literature = "0.1–5 J/m² in published calibrations of moist seeds and residues (effective, not a material constant)"
     lever = "pour a lighter fraction; turn the plate over; vary the mass"
-    telltales = (Telltale.SHAPE,)
+    telltales = (Telltale.SHAPE, Telltale.FLOW)
     revision = 2
     stage = Stage.ADHESION
     act = staticmethod(stick)

@@ -40,6 +40,6 @@ class AdhesionSJKR(ContactEffect):
     strongest = 1e6
     literature = "10⁴–10⁶ J/m³ in published calibrations with shear moduli near 10⁷–10⁸ Pa"
     lever = "vary the load on a contact: shear under a weight against free flow"
-    telltales = (Telltale.SHAPE,)
+    telltales = (Telltale.SHAPE, Telltale.FLOW)
     stage = Stage.ADHESION
     act = staticmethod(pull_by_area)

@@ -57,7 +57,7 @@ class CapillaryBridge(ContactEffect):
     strongest = 0.072
     literature = "clean water at 20 °C, 0.072 N/m, is the largest of the liquids that wet plant material"
     lever = "a moisture series; soap in the water lowers γ; the pull outlasts the touch"
-    telltales = (Telltale.SHAPE,)
+    telltales = (Telltale.SHAPE, Telltale.FLOW)
     revision = 2
     stage = Stage.ADHESION
     act = staticmethod(bridge)

@@ -70,7 +70,7 @@ class RollingResistance(ContactEffect):
     strongest = 0.3
     literature = "0.01–0.25 in published calibrations of seeds and crop residues; ≤ 0.3"
     lever = "roll a single body off a slope; it acts at every mass and size alike"
-    telltales = (Telltale.SHAPE,)
+    telltales = (Telltale.SHAPE, Telltale.FLOW)
     stage = Stage.ROLLING
     act = staticmethod(rolling_torque)
     memory = 3

@@ -33,7 +33,7 @@ class WallAdhesion(ContactEffect):
     strongest = 5.0
     literature = "0.1–5 J/m² between moist plant material and steel"
     lever = "another plate and funnel material; what is left in the funnel"
-    telltales = (Telltale.SHAPE,)
+    telltales = (Telltale.SHAPE, Telltale.FLOW)
     revision = 2
     stage = Stage.ADHESION
     act = staticmethod(stick_to_wall)

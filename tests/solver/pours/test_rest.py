@@ -1,9 +1,9 @@
 """What "at rest" is worth, and that sleeping changes no result. Slow: five minutes on one core.
 
-Last run in full on 2026-11-21: of 12 piles, woken and with sleeping off, 10 do not move at all (angle within 0.005 %
-in 2 s). In one a single petiole lies balanced on its round side and rolls on by 4 mm, which turns the angle by 4.3 %:
-nothing resists rolling in the base model, and its speed, below 0.5 mm/s at first, cannot be told from rest; the pile
-without it stands still. In one (small pile 8) a seed settles by 0.19 mm and the angle turns by 0.10 %.
+Last run in full on 2026-11-28, by physics 3: of 12 piles, woken and with sleeping off, no seed or plate moves by 0.1 mm
+in 2 s. A single petiole that lies balanced on its round side may roll on (by 4 mm in one pile of physics 2): nothing
+resists rolling in the base model, and its speed, below 0.5 mm/s at first, cannot be told from rest; the pile without it
+stands still.
 """
 
 import numpy as np
@@ -33,8 +33,7 @@ MOVED = 1e-4
     ("scene", "seed"),
     # Standard pile 3 jams.
     [
-        *((SMALL, seed) for seed in (1, 2, 3, 9, 13, 14, 18, 23)),
-        pytest.param(SMALL, 8, marks=pytest.mark.xfail(strict=True, reason="one seed settles by 0.19 mm in 2 s")),
+        *((SMALL, seed) for seed in (1, 2, 3, 8, 9, 13, 14, 18, 23)),
         *((STANDARD, seed) for seed in (1, 2, 4)),
     ],
     ids=lambda value: value if isinstance(value, int) else f"{1e3 * value.rig.mass:.0f}g",
