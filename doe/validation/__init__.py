@@ -9,7 +9,7 @@
     sets.py            rows in sets.jsonl, what an answer is worth, rates and targets
     reference.py       pours of every effect, many of each, that tell how strong it is
     limit.py           its strength in σ, and how often any method could name it
-    replay.py          the rule of the diagnosis on reference pours
+    cross_validation.py  the rule of the diagnosis on reference pours
     campaign.py        all of it, truths → folders → verdicts → rows, for ``explorer validate-diagnosis``
 
 The diagnosis is given the folder and nothing else: no truth, no label, no number.

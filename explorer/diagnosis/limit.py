@@ -17,10 +17,10 @@ from doe.measurement import Measurement, load_measurement
 from doe.measurement.features import OFFERS, feature_set
 from doe.record import plain
 from doe.store import Store, default_store
+from doe.validation.cross_validation import BASE_POURS, NULLS, CrossValidation, PlantedTruth, Teaching, cross_validated
 from doe.validation.laboratory import read_laboratory
 from doe.validation.limit import RISK, RISKS, LimitStudy, Strength, confused, limit_study
 from doe.validation.reference import ROOT, Reference, extended_to, kept
-from doe.validation.replay import BASE_POURS, NULLS, PlantedTruth, Replayed, Teaching, replay
 from explorer.background.progress import time_left
 from explorer.files.output_file import write_whole
 from explorer.files.run_folder import json_text
@@ -52,7 +52,7 @@ class LimitOrder:
     threads: int | None = None
 
 
-def run_limit(order: LimitOrder, say: Callable[[str], None]) -> tuple[LimitStudy, tuple[Replayed, ...]]:
+def run_limit(order: LimitOrder, say: Callable[[str], None]) -> tuple[LimitStudy, tuple[CrossValidation, ...]]:
     """Pour the rounds that are missing, and write what follows. Every pour and every round is kept."""
     measurement = _declared(order.source)
     declared = declare(measurement, tuple(EFFECTS))
@@ -62,13 +62,15 @@ def run_limit(order: LimitOrder, say: Callable[[str], None]) -> tuple[LimitStudy
         found = _poured(order, measurement, declared, found, say)
     offered = {offer: [one.offered(offer) for one in sets] for offer in OFFERS}
     study = limit_study(found.sample, found.levels, offered)
-    replayed = replays(found, study, offered)
+    validated = cross_validations(found, study, offered)
     made = {"title": found.title, "rounds": found.rounds, "physics": found.physics, "readings": found.readings}
-    write_whole(order.out, json_text(made | study.to_dict() | {"replayed": plain(replayed)}) + "\n")
-    return study, replayed
+    write_whole(order.out, json_text(made | study.to_dict() | {"cross_validation": plain(validated)}) + "\n")
+    return study, validated
 
 
-def replays(found: Reference, study: LimitStudy, offered: Mapping[str, Sequence[int]]) -> tuple[Replayed, ...]:
+def cross_validations(
+    found: Reference, study: LimitStudy, offered: Mapping[str, Sequence[int]]
+) -> tuple[CrossValidation, ...]:
     """What the rule of the diagnosis names, taught by few pours of every effect."""
     kinds, pours = [one.kind for one in study.reached], found.sample.pours
     rows = []
@@ -86,7 +88,7 @@ def replays(found: Reference, study: LimitStudy, offered: Mapping[str, Sequence[
             ]
             bands = [[one for one in enough if low <= one.strength < high] for low, high in BANDS]
             some = [truths for truths in bands if truths]
-            rows += replay(data, sample, kinds, some, teaching, SPLITS, np.random.default_rng(0))
+            rows += cross_validated(data, sample, kinds, some, teaching, SPLITS, np.random.default_rng(0))
     return tuple(rows)
 
 
@@ -122,7 +124,7 @@ def _poured(
         return extended_to(found, order.rounds, declared, pours, order.reference, say)
 
 
-def limit_text(found: LimitStudy, replayed: Sequence[Replayed]) -> str:
+def limit_text(found: LimitStudy, validated: Sequence[CrossValidation]) -> str:
     """Strengths, pairs that look alike, limits, and what the rule reaches, as tables."""
     data = tuple(found.reached[0].strength)
     strengths = [
@@ -145,7 +147,7 @@ def limit_text(found: LimitStudy, replayed: Sequence[Replayed]) -> str:
         [one.data, f"{one.strength:.1f}", _pours(one), str(one.sets)]
         + [f"{share:.1%}" for share in (one.right, *one.named)]
         + [f"{one.false[RISKS.index(RISK)]} of {one.nulls}"]
-        for one in replayed
+        for one in validated
     ]
     curve = tuple(f"named, {risk:.1%} wrong" for risk in RISKS)
     head_of_rule = ("data", "strength, σ", "taught by", "sets", "most probable is right", *curve, "false names")
@@ -161,7 +163,7 @@ def limit_text(found: LimitStudy, replayed: Sequence[Replayed]) -> str:
     )
 
 
-def _pours(found: Replayed) -> str:
+def _pours(found: CrossValidation) -> str:
     more = f" + {found.pours:.0f}" if found.teaching.more else ""
     return f"{found.teaching.all} of each{more}"
 

@@ -1,4 +1,4 @@
-"""The posterior: densities against SciPy's, and answers that have to come out; the replay on made-up pours."""
+"""The posterior: densities against SciPy's, and answers that have to come out; cross-validation on made-up pours."""
 
 import math
 from dataclasses import replace
@@ -23,8 +23,8 @@ from doe.diagnose.emulator import (
 )
 from doe.diagnose.posterior import BEYOND, FITS, NOTHING, OUTSIDE, PAIRS, SPREADS, Data, log_t, multiples, posterior
 from doe.errors import StatisticsError
+from doe.validation.cross_validation import NULLS, PlantedTruth, Teaching, cross_validated
 from doe.validation.limit import RISKS, DataKind
-from doe.validation.replay import NULLS, PlantedTruth, Teaching, replay
 from tests.doe.validation.test_limit_ruler import D, sample_of, unit
 
 SIZE = 2 * D
@@ -385,12 +385,12 @@ def truths(kinds):
 
 
 @pytest.mark.parametrize("teaching", [Teaching(8, 0), Teaching(4, 12)])
-def test_a_replay_names_what_is_far_apart_and_nothing_where_nothing_is(teaching):
+def test_a_cross_validation_names_what_is_far_apart_and_nothing_where_nothing_is(teaching):
     """Two effects of 4 pours' deviations at right angles; data have half of it, 2 √6 = 4.9 σ."""
     shifts = {"a strong": 4.0 * unit(0), "a weak": 2.0 * unit(0), "b strong": 4.0 * unit(7), "b weak": 2.0 * unit(7)}
     sample = sample_of(np.random.default_rng(1), shifts)
     kinds = [DataKind(name, name, False) for name in "ab"]
-    (found,) = replay("scan", sample, kinds, [truths(kinds)], teaching, 10, np.random.default_rng(0))
+    (found,) = cross_validated("scan", sample, kinds, [truths(kinds)], teaching, 10, np.random.default_rng(0))
     assert (found.sets, found.nulls) == (20, 10 * NULLS)
     assert found.right == 1.0
     assert found.named == (1.0,) * len(RISKS)
@@ -399,11 +399,11 @@ def test_a_replay_names_what_is_far_apart_and_nothing_where_nothing_is(teaching)
     assert max(found.false) <= 2
 
 
-def test_a_replay_of_effects_that_are_alike_is_a_guess():
+def test_a_cross_validation_of_effects_that_are_alike_is_a_guess():
     shifts = {f"{name} {size}": length * unit(0) for name in "ab" for size, length in (("strong", 4.0), ("weak", 2.0))}
     sample = sample_of(np.random.default_rng(1), shifts)
     kinds = [DataKind(name, name, False) for name in "ab"]
-    (found,) = replay("scan", sample, kinds, [truths(kinds)], Teaching(8, 0), 40, np.random.default_rng(0))
+    (found,) = cross_validated("scan", sample, kinds, [truths(kinds)], Teaching(8, 0), 40, np.random.default_rng(0))
     assert 0.2 < found.right < 0.8
     assert found.named[RISKS.index(0.01)] < 0.2
 
@@ -416,7 +416,7 @@ def test_a_feature_that_hardly_ever_varies_does_not_spoil_the_answer():
         blocks[0][:, 3] = 0.0
     sample.pours["base"][0][::40, 3] = 1.0
     kinds = [DataKind("a", "a", False)]
-    (found,) = replay("scan", sample, kinds, [truths(kinds)], Teaching(8, 0), 20, np.random.default_rng(0))
+    (found,) = cross_validated("scan", sample, kinds, [truths(kinds)], Teaching(8, 0), 20, np.random.default_rng(0))
     assert found.named == (1.0,) * len(RISKS)
 
 

@@ -61,7 +61,7 @@ def test_tables_and_file_follow_from_the_reference(model, tmp_path):
     scans = {(row["data"], row["replicates"], row["limit"]["strength"]): row["limit"] for row in found["rows"]}
     # The second effect is nearly unseen in scalars and far off in a scan.
     assert scans["scan", 6, 4.0]["by_effect"]["size_dispersion"] > 0.95
-    assert {row["data"] for row in found["replayed"]} == {"scalars", "profile", "scan"}
+    assert {row["data"] for row in found["cross_validation"]} == {"scalars", "profile", "scan"}
 
 
 def test_a_reference_of_another_physics_is_refused(model, tmp_path):

@@ -1,4 +1,4 @@
-"""The rule of the diagnosis played on reference pours: how often it names the right effect, beside the Bayes limit.
+"""The rule of the diagnosis, cross-validated on reference pours: how often it names the right effect, beside the limit.
 
 In every split some pours teach the models and others, disjoint from them, are data: six of an effect at its reference
 amplitude or at half of it, or six of the base model. Nothing is poured, so a rule can be tried in seconds. Each effect
@@ -60,7 +60,7 @@ class PlantedTruth(Record):
 
 
 @dataclass(frozen=True)
-class Replayed(Record):
+class CrossValidation(Record):
     """What the rule answers to data with an effect of a range of strengths.
 
     Attributes
@@ -105,7 +105,7 @@ class _Answer:
     pours: int
 
 
-def replay(
+def cross_validated(
     data: str,
     sample: ReferencePours,
     kinds: Sequence[DataKind],
@@ -113,8 +113,8 @@ def replay(
     teaching: Teaching,
     splits: int,
     rng: np.random.Generator,
-) -> list[Replayed]:
-    """Play the rule on ``splits`` splits of ``sample``.
+) -> list[CrossValidation]:
+    """Judge by the rule on ``splits`` splits of ``sample``.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def replay(
             pours = tuple(block[first : first + REPLICATES] for block in split.pours["base"])
             nothing.append(_Answer("", *split.judged(pours)))
     return [
-        _replayed(data, teaching, float(np.mean([one.strength for one in truths])), own, nothing)
+        _rates(data, teaching, float(np.mean([one.strength for one in truths])), own, nothing)
         for own, truths in zip(answers, bands, strict=True)
     ]
 
@@ -227,9 +227,9 @@ def _first(blocks: Blocks, number: int) -> Blocks:
     return tuple(block[:number] for block in blocks)
 
 
-def _replayed(
+def _rates(
     data: str, teaching: Teaching, strength: float, sets: Sequence[_Answer], nothing: Sequence[_Answer]
-) -> Replayed:
+) -> CrossValidation:
     nulls = np.array([one.found.best[1] for one in nothing])
     p = np.array([one.found.best[1] for one in sets])
     correct = np.array([one.found.best[0] == one.truth for one in sets])
@@ -238,7 +238,7 @@ def _replayed(
     last = np.searchsorted(wrong, RISKS, side="right") - 1
     thresholds = tuple(float(p[order[k]]) if k >= 0 else 2.0 for k in last)
     truths = np.array([one.truth for one in sets])
-    return Replayed(
+    return CrossValidation(
         data=data,
         teaching=teaching,
         strength=strength,
