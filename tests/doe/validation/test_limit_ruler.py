@@ -9,9 +9,11 @@ from doe.validation.limit import fold_shifts, metric_of, product, ruler_of, stre
 from doe.validation.reference import SIDE, ReferencePours
 
 D, POURS = 6, 96
+IDLE = np.zeros((1, 2 * D))
+"""What one parameter does that does nothing."""
 
 
-def sample_of(rng, shifts, pours=POURS, slopes=(), scale=1.0):
+def sample_of(rng, shifts, pours=POURS, slopes=IDLE, scale=1.0):
     """Pours of unit noise (times ``scale``) in two conditions of ``D`` features; a shift is that of both.
 
     ``slopes``: what each parameter does per standard deviation.
