@@ -277,7 +277,7 @@ def lessons_of(sample, ways):
     parts = []
     for kind, blocks in sample.pours.items():
         n = len(blocks[0])
-        theta = {"friction -": -1.5, "friction +": 1.5}.get(kind, 0.0)
+        theta = {"friction_0 -": -1.5, "friction_0 +": 1.5}.get(kind, 0.0)
         way, amplitude = ways.get(kind, (-1, 0.0))
         parts.append(Lessons(np.full((n, 1), theta), np.full(n, way), np.full(n, amplitude), np.ones(n, bool), blocks))
     found = parts[0]
@@ -287,7 +287,7 @@ def lessons_of(sample, ways):
 
 
 def test_the_emulator_is_taught_by_pours():
-    sample = sample_of(np.random.default_rng(0), {"push": 4.0 * unit(2), "half": 2.0 * unit(2)}, sensitivity=unit(5))
+    sample = sample_of(np.random.default_rng(0), {"push": 4.0 * unit(2), "half": 2.0 * unit(2)}, slopes=[unit(5)])
     found = emulated(lessons_of(sample, {"push": (0, 1.0), "half": (0, 0.5)}), [Way("push", "push")])
     # Three groups, for pours with a parameter moved are the base model's, and one parameter.
     assert found.freedom == 2 * 96 + 4 * 96 - 3 - 1

@@ -25,8 +25,8 @@ def sample_of(rng, shifts, pours=POURS, slopes=IDLE, scale=1.0):
     kinds = {"base": blocks(np.zeros(2 * D), 2 * pours)}
     kinds |= {name: blocks(shift, pours) for name, shift in shifts.items()}
     for k, slope in enumerate(slopes):
-        kinds |= {f"p{k} -": blocks(-SIDE * slope, pours), f"p{k} +": blocks(SIDE * slope, pours)}
-    return ReferencePours(kinds, tuple(f"p{k}" for k in range(len(slopes))))
+        kinds |= {f"friction_{k} -": blocks(-SIDE * slope, pours), f"friction_{k} +": blocks(SIDE * slope, pours)}
+    return ReferencePours(kinds, tuple(f"friction_{k}" for k in range(len(slopes))))
 
 
 def unit(*places):
