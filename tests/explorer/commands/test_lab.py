@@ -165,7 +165,7 @@ def test_a_part_of_another_material_makes_no_file(tmp_path):
     assert "part.toml: does not fit the starter material" in line
     assert not (tmp_path / "lentil.toml").exists()
     assert "exists" in refused(explorer("new", "material", "part", "--part", part, "--out", tmp_path))
-    assert "new material" in refused(explorer("new", "study", "lentil", "--part", part, "--out", tmp_path))
+    assert "No such option: --part" in refused(explorer("new", "study", "lentil", "--part", part, "--out", tmp_path))
 
 
 def test_the_figure_of_a_curved_body_draws_the_law(tmp_path):

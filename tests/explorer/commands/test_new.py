@@ -143,7 +143,7 @@ def test_existing_files_are_left_alone(tmp_path):
     [
         (["material", "../pellets"], "letters, digits"),
         (["material", ""], "letters, digits"),
-        (["rig", "pellets"], "material"),
+        (["rig", "pellets"], "No such command 'rig'"),
         (["study", "pellets", "--material", "gold"], "gold"),
         (["material", "pellets", "--material", "sunflower_extract"], "--material"),
     ],
@@ -153,7 +153,11 @@ def test_new_refuses(arguments, word, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("option", [("--condition", "B"), ("--scan-unit", "mm"), ("--lag", "1")])
-def test_what_belongs_to_a_measurement_is_refused_elsewhere(option, tmp_path):
-    assert "belong to `new measurement`" in refused(explorer("new", "material", "lentil", "--out", tmp_path, *option))
+@pytest.mark.parametrize(
+    ("kind", "option"),
+    [("material", "--condition"), ("study", "--scan-unit"), ("project", "--lag"), ("study", "--like")],
+)
+def test_an_option_of_another_kind_is_refused(kind, option, tmp_path):
+    line = refused(explorer("new", kind, "lentil", "--out", tmp_path, option, "1"))
+    assert line.startswith(f"No such option: {option}")
     assert list(tmp_path.iterdir()) == []

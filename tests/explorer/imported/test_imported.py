@@ -282,7 +282,7 @@ def test_one_input_at_a_time_and_for_a_material(tmp_path):
     path = tmp_path / "input.txt"
     assert "No such file" in refused(explorer("new", "material", "mine", "--from-yade", path, "--out", tmp_path))
     assert "--from-liggghts" in refused(explorer("new", "material", "mine", "--from-liggghts", path, "--like", "maize"))
-    assert "belong to `new material`" in refused(explorer("new", "study", "mine", "--from-edem", path))
+    assert "No such option: --from-edem" in refused(explorer("new", "study", "mine", "--from-edem", path))
 
 
 def test_tables_of_names_with_blanks_come_back(tmp_path):
