@@ -253,6 +253,7 @@ class Answers:
             bias_before=bias_before,
             bias_after=bias_after,
             pours=fitted.run_now + held.run_now,
+            physics=PHYSICS,
         )
         return Judged(row, suggestion)
 
@@ -314,6 +315,7 @@ class Answers:
             amplitude=amplitude_text(truth),
             offer=offer,
             verdict=verdict,
+            physics=PHYSICS,
         )
 
     def model_pours(self, conditions: Sequence[Condition], place: int | None = None) -> ModelPours:

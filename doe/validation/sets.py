@@ -87,6 +87,8 @@ class SetRow(Record):
         measurements]; NaN unless the name is right.
     pours, seconds
         Pours that were run for it, and wall time.
+    physics
+        Version of the solver's physics that poured; 0 in rows from before it was kept.
     """
 
     laboratory: str
@@ -114,6 +116,7 @@ class SetRow(Record):
     bias_after: float = math.nan
     pours: int = 0
     seconds: float = 0.0
+    physics: int = 0
 
     @property
     def answer(self) -> Answer:

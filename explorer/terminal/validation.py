@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from doe.validation.sets import RISKS, Answer, Rate, Scores, SetRow, Tempered, by_temperature, scores, targets
 from explorer.terminal.text_table import text_table
+from solver import PHYSICS
 
 ANSWERS: tuple[Answer, ...] = ("nothing", "right", "undecided", "unexplained", "wrong")
 
@@ -15,7 +16,10 @@ def campaign_text(rows: Sequence[SetRow]) -> str:
     judged = [row for row in rows if row.answer != "out of reach"]
     offers = sorted({row.offer for row in judged})
     sets = {(row.root, row.number) for row in rows}
-    parts = [f"{len({(row.root, row.number) for row in judged})} of {len(sets)} data sets within reach"]
+    parts = [
+        f"{len({(row.root, row.number) for row in judged})} of {len(sets)} data sets within reach",
+        *_by_physics(rows),
+    ]
     for offer in offers:
         own = [row for row in judged if row.offer == offer]
         parts += [f"with {offer}" if offer == "scalars" else f"with a {offer}", matrix_text(own), effects_text(own)]
@@ -114,6 +118,14 @@ def group_of(row: SetRow) -> str:
     if row.kind == "effect":
         return f"effect, {row.strength:g} σ"
     return "pair" if row.kind == "pair" else f"outside: {row.label}"
+
+
+def _by_physics(rows: Sequence[SetRow]) -> Iterator[str]:
+    """Where not all sets were poured by the physics of this program, how many were by which."""
+    sets = Counter({(row.root, row.number): row.physics for row in rows}.values())
+    if set(sets) - {PHYSICS}:
+        each = ", ".join(f"{number} by {f'physics {p}' if p else 'one not kept'}" for p, number in sorted(sets.items()))
+        yield f"poured: {each}; this program has physics {PHYSICS}"
 
 
 def _wrong(rows: Sequence[SetRow]) -> Iterator[str]:

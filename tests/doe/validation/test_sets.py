@@ -13,6 +13,7 @@ from doe.diagnose.verdict import THRESHOLD
 from doe.errors import StatisticsError
 from doe.validation.sets import (
     LEAST_P,
+    NONE,
     TEMPERATURES,
     SetRow,
     answer_to,
@@ -24,6 +25,7 @@ from doe.validation.sets import (
     wilson,
 )
 from explorer.terminal.validation import campaign_text
+from solver import PHYSICS
 
 NAN = math.nan
 
@@ -207,3 +209,9 @@ def test_targets_by_hand():
     assert re.search(r"effect, 10 σ +5 +0 +4 +0 +0 +1\n", text)
     assert "wrong, set 5.54: a at 10 σ → effect:b" in text
     assert "with scalars" in text
+
+
+def test_sets_of_another_physics_are_told_apart():
+    rows = [replace(row(k, "null", NONE, "no_missing_effect"), physics=one) for k, one in enumerate((PHYSICS, 2, 2, 0))]
+    assert f"poured: 1 by one not kept, 2 by physics 2, 1 by physics {PHYSICS};" in campaign_text(rows)
+    assert "poured:" not in campaign_text(rows[:1])
