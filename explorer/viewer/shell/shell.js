@@ -9,8 +9,12 @@ const SMALL_WINDOW = 700;  // pixels, as viser's own
 const LATEST_MS = 10000;  // until which what stands in a room may still come
 let channel = null, sought = null;
 
+// What is asked for while the page still connects is sent once it has; after that, only while it is connected.
+let unsent = [];
 function send(command) {
-  if (channel && channel.readyState === WebSocket.OPEN) channel.send(JSON.stringify(command));
+  const text = JSON.stringify(command);
+  if (channel && channel.readyState === WebSocket.OPEN) channel.send(text);
+  else unsent?.push(text);
 }
 
 // A tab by its name: in a panel that is open, folded to the edge of the window, or in a small window's bottom sheet.
@@ -205,6 +209,10 @@ function connect() {
   channel = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/shell/channel`);
   channel.onmessage = message => {
     for (const [key, value] of Object.entries(JSON.parse(message.data))) show[key]?.(value);
+  };
+  channel.onopen = () => {
+    unsent?.forEach(text => channel.send(text));
+    unsent = null;
   };
   channel.onclose = () => setTimeout(connect, RECONNECT_MS);
 }
