@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
+from queue import SimpleQueue
 from types import FrameType
 
 from explorer.background.command_process import PourPlace
@@ -149,10 +150,17 @@ def board(
 @contextmanager
 def stopped_by_signals() -> Iterator[threading.Event]:
     """An event that SIGINT and SIGTERM set; the handlers from before come back at the end."""
-    stop = threading.Event()
+    stop, asked = threading.Event(), SimpleQueue[int]()
 
     def set_stop(number: int, frame: FrameType | None) -> None:
+        # Not the event itself: where a signal finds this thread inside stop.wait, its lock is held and never let go.
+        asked.put(number)
+
+    def set_when_asked() -> None:
+        asked.get()
         stop.set()
+
+    threading.Thread(target=set_when_asked, daemon=True, name="explorer-stop").start()
 
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = [signal.signal(number, set_stop) for number in numbers]
