@@ -161,7 +161,6 @@ def stopped_by_signals() -> Iterator[threading.Event]:
         stop.set()
 
     threading.Thread(target=set_when_asked, daemon=True, name="explorer-stop").start()
-
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = [signal.signal(number, set_stop) for number in numbers]
     try:
@@ -169,3 +168,4 @@ def stopped_by_signals() -> Iterator[threading.Event]:
     finally:
         for number, handler in zip(numbers, before, strict=True):
             signal.signal(number, handler)
+        asked.put(0)  # so that the thread ends too
