@@ -38,7 +38,7 @@ class Twisting(ContactEffect):
     strongest = 10.0
     literature = "1 for smooth spheres (Marshall 2009); up to 10 for contacts wider than Hertz's, such as flats"
     lever = "spin a single body about a vertical axis on the plate"
-    telltales = (Telltale.SHAPE,)
+    telltales = (Telltale.SHAPE, Telltale.FLOW)
     stage = Stage.TWISTING
     act = staticmethod(twisting_torque)
     memory = 1

@@ -76,6 +76,7 @@ BODY = {
     "members": ti.i32,  # number of member spheres
     "kind": ti.i32,  # contact class
     "alive": ti.i32,  # 0: taken out of the world
+    "has_left": ti.i32,  # 1: has been below the outlet
     "listed": ti.i32,  # 1: has entries in the contact list
     "touching": ti.i32,  # number of touching contacts with other bodies, set by ``summarise``
     "low": Vec3,  # bounding box when the list was built [m]

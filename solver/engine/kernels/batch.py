@@ -150,7 +150,8 @@ def measure(s: ti.template(), world_index: ti.i32):
 def take_out(s: ti.template(), world_index: ti.i32) -> ti.i32:
     """Take bodies out that left the domain; returns how many were lost.
 
-    Rolling or hopping out over the plate is a stray; leaving above the outlet or through the plate is a loss.
+    Rolling or bouncing out over the plate is a stray, however high a body that has come out of the outlet bounces;
+    leaving above the outlet without having come out of it, or through the plate, is a loss.
     """
     lost = 0
     ti.loop_config(serialize=ti.static(serial()))
@@ -159,7 +160,9 @@ def take_out(s: ti.template(), world_index: ti.i32) -> ti.i32:
             if s.body.alive[w, b] == 1:
                 x = s.body.position[w, b]
                 outside = ti.abs(x[0]) > s.world.domain[w] or ti.abs(x[1]) > s.world.domain[w]
-                if x[2] < -s.body.reach[w, b] or (outside and x[2] > s.world.outlet[w]):
+                if x[2] <= s.world.outlet[w]:
+                    s.body.has_left[w, b] = 1
+                if x[2] < -s.body.reach[w, b] or (outside and s.body.has_left[w, b] == 0):
                     lost += 1
                 if outside:
                     s.body.alive[w, b] = 0

@@ -67,6 +67,7 @@ def load_state(s: ti.template(), w: ti.i32, b: ti.i32, pose: Row):
     s.body.asleep[w, b] = 0
     s.body.listed[w, b] = 0
     s.body.alive[w, b] = 1
+    s.body.has_left[w, b] = 0
     s.world.bodies[w] = ti.max(s.world.bodies[w], b + 1)
     s.world.outdated[w] = 1
 

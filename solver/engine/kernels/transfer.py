@@ -87,6 +87,7 @@ def load_bodies(s: ti.template(), w: ti.i32, numbers: Table, places: IntTable, s
         s.body.members[w, b] = places[b, 1]
         s.body.kind[w, b] = places[b, 2]
         s.body.alive[w, b] = 0
+        s.body.has_left[w, b] = 0
         s.body.asleep[w, b] = 0
         s.body.listed[w, b] = 0
         s.body.touching[w, b] = 0

@@ -48,8 +48,8 @@ def test_a_summary_without_scatter_is_no_equation(tmp_path):
         ("angle_of_repose_deg", {"rolling_resistance", "adhesion_jkr"}, {"air_drag", "plate_tilt", "density_error"}),
         (
             "discharge_t50_s",
-            {"air_drag", "density_error", "rolling_resistance", "adhesion_jkr"},
-            {"twisting", "plate_tilt"},
+            {"air_drag", "density_error", "rolling_resistance", "adhesion_jkr", "twisting"},
+            {"funnel_offset", "plate_tilt"},
         ),
         ("centroid_x_m", {"plate_tilt", "funnel_offset"}, {"rolling_resistance", "air_drag", "size_dispersion"}),
         ("stray_fraction", {"velocity_dependent_restitution"}, {"shape_elongation", "plate_tilt"}),

@@ -193,6 +193,20 @@ def test_broken_states_are_named_outcomes(place, velocity, outcome):
     assert pour.message
 
 
+def test_a_body_that_came_out_and_bounces_out_of_the_domain_above_the_outlet_is_a_stray():
+    """Off the plate at 3 m/s outward and 2 m/s upward: it leaves (400 mm) some 100 mm up, 35 above the outlet."""
+    pour = Pour(Batch(capacity_for([COARSE], 1)), 0, QUICK, 1)
+    place, velocity = np.array([0.25, 0.0, 0.01]), np.array([3.0, 0.0, 2.0])
+    pour.batch.enter(0, 0, place, np.array([1.0, 0, 0, 0]), velocity, np.zeros(3))
+    while (n := pour.steps_due()) and pour.time < 0.1:
+        pour.after(n, pour.batch.advance(np.array([n], dtype=np.int32))[0])
+    body = pour.batch.bodies(0, 1)[0]
+    assert body[13] == 0.0, "it has not been taken out"
+    assert body[2] > QUICK.rig.outlet_height, "it was to leave above the outlet"
+    assert pour.outcome == Outcome.RUNNING
+    assert not any(sample["lost"] for sample in pour.samples)
+
+
 def test_contact_list_overflow_is_a_named_outcome():
     batch = Batch(dataclasses.replace(capacity_for([COARSE], 1), contacts=4))
     pour = Pour(batch, 0, QUICK, 1)
