@@ -11,6 +11,9 @@ pooled over the n measured pours and the m simulated ones of the final model: s_
 somewhere, and that observable would then make most of the sum. With n = 3, m = 8 and eleven normal observables a
 perfect model shows 1.5 times the floor (root mean square) by s_meas, 1.15 times by s. Predictions are fresh
 simulations, never the emulator.
+
+A single measured replicate does not tell its scatter. Its variance is that of the simulated pours of the final model,
+of the mean of k of them if it is one, and of its instrument, s_after^2/k + u^2 with the stated u.
 """
 
 from __future__ import annotations
@@ -33,19 +36,50 @@ OVERALL = "overall"
 
 
 @dataclass(frozen=True)
-class HoldoutCondition:
-    """Replicates of one condition: measured (r, d), simulated by the base model (m, d) and by the final one (m', d)."""
+class MeasuredReplicates:
+    """What was measured in one condition.
 
-    name: str
+    Attributes
+    ----------
+    condition, summaries
+        Names of the condition and of its d summaries.
+    values
+        Replicates (r, d).
+    stated
+        Standard uncertainty of a replicate (d,), 0 where none is stated; used for a single one.
+    mean_of
+        Pours whose mean a replicate is.
+    """
+
+    condition: str
     summaries: tuple[str, ...]
-    measured: FloatArray
+    values: FloatArray
+    stated: FloatArray
+    mean_of: int = 1
+
+    @property
+    def instrument(self) -> FloatArray:
+        """The uncertainty that is not in the scatter of the replicates (d,): what is stated, of a single one."""
+        return self.stated if len(self.values) == 1 else np.zeros_like(self.stated)
+
+    @property
+    def share(self) -> float:
+        """Variance of a replicate, without that, as a share of the variance that its scatter is taken from."""
+        return 1.0 / self.mean_of if len(self.values) == 1 else 1.0
+
+
+@dataclass(frozen=True)
+class HoldoutCondition:
+    """What was measured in one condition beside pours of the base model (m, d) and of the final one (m', d)."""
+
+    measured: MeasuredReplicates
     before: FloatArray
     after: FloatArray
 
 
 @dataclass(frozen=True)
 class HoldoutError(Record):
-    """Errors of one observable (its own unit) or overall (standard deviations of a pour).
+    """Errors of one observable (its own unit) or overall (standard deviations of a replicate).
 
     skill with its 95 % bootstrap interval is NaN where the base model is within the noise already. ratio = after/noise.
     coverage_before, coverage_after: share of measured pours inside the models' 90 % predictive intervals.
@@ -68,11 +102,11 @@ def holdout_errors(
 ) -> tuple[HoldoutError, ...]:
     """Return the errors per observable, in order of first appearance, and overall last.
 
-    Raises StatisticsError without a condition, or where measured, before or after has fewer than two replicates.
+    Raises StatisticsError without a condition, without a measured replicate, or with fewer than two pours of a model.
     """
     _require(conditions)
     generator = np.random.default_rng(seed)
-    entries = [_Entry.of(c, i, samples, generator) for c in conditions for i in range(len(c.summaries))]
+    entries = [_Entry.of(c, i, samples, generator) for c in conditions for i in range(len(c.measured.summaries))]
     names = list(dict.fromkeys(entry.observable for entry in entries))
     groups = [[entry for entry in entries if entry.observable == name] for name in names]
     rows = [_error(name, group, np.ones(len(group))) for name, group in zip(names, groups, strict=True)]
@@ -98,25 +132,28 @@ class _Entry:
 
     @staticmethod
     def of(condition: HoldoutCondition, column: int, samples: int, generator: np.random.Generator) -> _Entry:
-        measured, before, after = (
-            values[:, column] for values in (condition.measured, condition.before, condition.after)
-        )
-        unit = float(pooled_deviation(measured, after)) or 1.0
+        data = condition.measured
+        measured, before, after = (values[:, column] for values in (data.values, condition.before, condition.after))
+        alone, instrument = len(measured) == 1, float(data.instrument[column])
+        deviation = math.sqrt(data.share * float(pooled_deviation(measured, after)) ** 2 + instrument**2)
+        noise = deviation**2 if alone else _square_error(measured)
         draws = [
             values[generator.integers(0, len(values), size=(samples, len(values)))].mean(axis=1)
             for values in (measured, before, after)
         ]
+        if alone:
+            draws[0] = draws[0] + deviation * generator.standard_normal(samples)
         return _Entry(
-            observable=condition.summaries[column],
+            observable=data.summaries[column],
             before=float(before.mean() - measured.mean()),
             after=float(after.mean() - measured.mean()),
-            noise_before=_square_error(measured) + _square_error(before),
-            noise_after=_square_error(measured) + _square_error(after),
-            unit=unit,
+            noise_before=noise + _square_error(before),
+            noise_after=noise + _square_error(after),
+            unit=deviation or 1.0,
             before_draws=draws[1] - draws[0],
             after_draws=draws[2] - draws[0],
-            inside_before=_inside(before, measured),
-            inside_after=_inside(after, measured),
+            inside_before=_inside(before, measured, data.share, instrument),
+            inside_after=_inside(after, measured, data.share, instrument),
         )
 
 
@@ -165,10 +202,16 @@ def _square_error(values: FloatArray) -> float:
     return float(values.var(ddof=1) / len(values))
 
 
-def _inside(predicted: FloatArray, measured: FloatArray, level: float = 0.9) -> FloatArray:
-    """Return 1 where a measured pour lies within mean ± t s sqrt(1 + 1/m) of m simulated ones."""
+def _inside(
+    predicted: FloatArray, measured: FloatArray, share: float, instrument: float, level: float = 0.9
+) -> FloatArray:
+    """Return 1 where a measured replicate lies within mean ± t sqrt(s^2 (share + 1/m) + u^2) of m simulated pours.
+
+    The degrees of freedom of t are those of s, also beside u.
+    """
     m = len(predicted)
-    half = stats.t.ppf((1 + level) / 2, m - 1) * predicted.std(ddof=1) * math.sqrt(1 + 1 / m)
+    variance = float(predicted.var(ddof=1)) * (share + 1 / m) + instrument**2
+    half = stats.t.ppf((1 + level) / 2, m - 1) * math.sqrt(variance)
     return (np.abs(measured - predicted.mean()) <= half).astype(np.float64)
 
 
@@ -176,8 +219,9 @@ def _require(conditions: Sequence[HoldoutCondition]) -> None:
     if not conditions:
         raise StatisticsError("holdout: no condition")
     for condition in conditions:
-        counts = [len(condition.measured), len(condition.before), len(condition.after)]
-        if min(counts) < 2:
+        measured, before, after = len(condition.measured.values), len(condition.before), len(condition.after)
+        if measured < 1 or min(before, after) < 2:
             raise StatisticsError(
-                f"{condition.name}: replicates measured, before, after = {counts}; at least 2 are needed"
+                f"{condition.measured.condition}: replicates measured {measured}, poured {before} before and {after} "
+                "after; at least 1, 2 and 2 are needed"
             )

@@ -5,9 +5,12 @@ an answer back. The farthest summary of the final model over all held-out condit
 
     |t| = max |measured − poured| / (s √(1/r + 1/m))
 
-with r measured and m fresh pours, s the deviation of a pour pooled over both and f degrees of freedom; Bonferroni's
-p = (number of summaries) P(|t_f| ≥ |t|) below ``CONTRADICTED`` contradicts it. That is strict because the error of the
-fit is not in s, and summary by summary because what is missing shows in what it acts on, not evenly over all.
+with r measured and m fresh pours, s the deviation of a pour pooled over both and f = r + m − 2 degrees of freedom. For
+a single measured replicate, the mean of k pours, s is that of the fresh pours alone and the stated uncertainty u of its
+instrument comes in: below the bar stands √(s² (1/k + 1/m) + u²), with f (1 + u²/(s² (1/k + 1/m)))² degrees of freedom
+(Welch and Satterthwaite, doi 10.2307/3002019). Bonferroni's p = (number of summaries) P(|t_f| ≥ |t|) below
+``CONTRADICTED`` contradicts it. That is strict because the error of the fit is not in s, and summary by summary
+because what is missing shows in what it acts on, not evenly over all.
 
 Of scanned piles the same pours show where the residual sits: measured minus poured height over the plate, before and
 after. Nothing is decided by that.
@@ -16,7 +19,7 @@ after. Nothing is decided by that.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +30,7 @@ from doe.declared.points import Point
 from doe.declared.pours import ModelPours, PointPour
 from doe.diagnose.posterior import Fit
 from doe.diagnose.result import CalibratedModel, HeldOut
+from doe.holdout import MeasuredReplicates
 from doe.measurement.features import coarse_map
 from doe.measurement.measurement import Condition
 from doe.measurement.piles import PileSurface
@@ -98,39 +102,29 @@ def _confirmed(model: CalibratedModel, rows: Sequence[Sequence[PointPour]], widt
     return Confirmed(model, tuple(blocks), broken, tuple(profiles))
 
 
-@dataclass(frozen=True)
-class HeldOutData:
-    """A held-out condition: its name, names of its summaries, measured replicates (r, d)."""
-
-    condition: str
-    summaries: tuple[str, ...]
-    measured: FloatArray
-
-
-def held_out(label: str, data: Sequence[HeldOutData], poured: Sequence[FloatArray]) -> HeldOut | None:
+def held_out(label: str, data: Sequence[MeasuredReplicates], poured: Sequence[FloatArray]) -> HeldOut | None:
     """Compare ``data`` with fresh pours (m, d) of the model ``label``; None where nothing can be compared."""
-    worst: tuple[float, int, str, str] | None = None
+    worst: HeldOut | None = None
     asked = 0
     for one, block in zip(data, poured, strict=True):
-        if min(len(one.measured), len(block)) < 2:
+        r, m = len(one.values), len(block)
+        if r < 1 or m < 2:
             continue
-        freedom = len(one.measured) + len(block) - 2
-        floor = CONSTANT_FLOOR * np.abs(np.concatenate([one.measured, block])).max(axis=0)
-        spread = np.maximum(pooled_deviation(one.measured, block), floor)
-        off = np.abs(one.measured.mean(axis=0) - block.mean(axis=0))
+        floor = CONSTANT_FLOOR * np.abs(np.concatenate([one.values, block])).max(axis=0)
+        spread = np.maximum(pooled_deviation(one.values, block), floor)
         varies = spread > 0.0
         if not varies.any():
             continue
         asked += int(varies.sum())
-        t = np.where(varies, off / np.where(varies, spread, 1.0), 0.0) / np.sqrt(1 / len(one.measured) + 1 / len(block))
-        k = int(t.argmax())
-        if worst is None or stats.t.sf(t[k], freedom) < stats.t.sf(worst[0], worst[1]):
-            worst = float(t[k]), freedom, one.condition, one.summaries[k]
-    if worst is None:
-        return None
-    t_most, freedom, condition, summary = worst
-    p = min(1.0, asked * 2.0 * float(stats.t.sf(t_most, freedom)))
-    return HeldOut(label, condition, summary, t_most, p)
+        scatter = np.where(varies, spread, 1.0) ** 2 * (one.share / r + 1 / m)
+        variance = scatter + one.instrument**2
+        off = np.where(varies, np.abs(one.values.mean(axis=0) - block.mean(axis=0)), 0.0)
+        t, freedom = off / np.sqrt(variance), (r + m - 2) * (variance / scatter) ** 2
+        tails = stats.t.sf(t, freedom)
+        k = int(np.lexsort((-t, tails))[0])
+        if worst is None or tails[k] < worst.p:
+            worst = HeldOut(label, one.condition, one.summaries[k], float(t[k]), float(tails[k]))
+    return None if worst is None else replace(worst, p=min(1.0, asked * 2.0 * worst.p))
 
 
 def residual_maps(

@@ -16,7 +16,6 @@ from doe.diagnose.compared_features import Compared, measured, weighed
 from doe.diagnose.confirm import (
     CONTRADICTED,
     Confirmed,
-    HeldOutData,
     confirm,
     held_out,
     model_of,
@@ -27,11 +26,11 @@ from doe.diagnose.result import NO_EFFECT, HeldOut, Level, Offered, Suggestion
 from doe.diagnose.training_pours import Say, TrainingPours
 from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD, Verdict, taken_back, verdict_of
 from doe.errors import MeasurementError
-from doe.holdout import HoldoutCondition, HoldoutError, holdout_errors
+from doe.holdout import HoldoutCondition, HoldoutError, MeasuredReplicates, holdout_errors
 from doe.measurement.features import SCAN, feature_set
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.residual_map import ResidualMap
-from doe.measurement.summaries import summaries_of_data, summary_names
+from doe.measurement.summaries import summaries_of_data, summary_names, summary_uncertainties
 from doe.pour_runner import Pours
 from doe.store import Store
 
@@ -245,8 +244,18 @@ def offered(condition: Condition, c: int, compared: Compared) -> Offered:
 def held_out_of(conditions: Sequence[Condition], label: str, final: Confirmed) -> HeldOut | None:
     """What those of ``conditions`` that are held out say of the final model."""
     places = [c for c, condition in enumerate(conditions) if condition.role == "holdout"]
-    data = [HeldOutData(conditions[c].name, summary_names(conditions[c]), complete_rows(conditions[c])) for c in places]
-    return held_out(label, data, [final.blocks[c] for c in places])
+    return held_out(label, [replicates_of(conditions[c]) for c in places], [final.blocks[c] for c in places])
+
+
+def replicates_of(condition: Condition) -> MeasuredReplicates:
+    """What was measured in ``condition``."""
+    return MeasuredReplicates(
+        condition.name,
+        summary_names(condition),
+        complete_rows(condition),
+        np.nan_to_num(summary_uncertainties(condition)),
+        condition.mean_of,
+    )
 
 
 def complete_rows(condition: Condition) -> FloatArray:
@@ -256,10 +265,10 @@ def complete_rows(condition: Condition) -> FloatArray:
 
 
 def errors_of(conditions: Sequence[Condition], role: str, found: Conclusion) -> tuple[HoldoutError, ...]:
-    """Errors over the conditions of ``role``; those with fewer than two readable pours on any side are left out."""
+    """Errors over the conditions of ``role``, but for those without a measured replicate or two pours of each model."""
     compared = []
     for c, condition in enumerate(conditions):
-        rows = complete_rows(condition), found.before.blocks[c], found.after.blocks[c]
-        if condition.role == role and min(map(len, rows)) >= 2:
-            compared.append(HoldoutCondition(condition.name, summary_names(condition), *rows))
+        measured, poured = replicates_of(condition), (found.before.blocks[c], found.after.blocks[c])
+        if condition.role == role and len(measured.values) and min(map(len, poured)) >= 2:
+            compared.append(HoldoutCondition(measured, *poured))
     return holdout_errors(compared) if compared else ()

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 import tomlkit
 
-from doe.diagnose.diagnosis import Diagnosis, complete_rows
+from doe.diagnose.diagnosis import Diagnosis, replicates_of
 from doe.measurement.measurement import Condition, Measurement
-from doe.measurement.summaries import summary_names
 from doe.studies.study import CALIBRATED
 from explorer.diagnosis.piles import model_scene
 from explorer.diagnosis.result import SHORT_PROFILE
@@ -96,12 +95,17 @@ def _factors(measurement: Measurement, diagnosis: Diagnosis, scene: Scene) -> li
 
 
 def _targets(condition: Condition, diagnosis: Diagnosis, scene: Scene) -> list[dict[str, Any]]:
-    """The angle of repose, or else the number that the declared model missed most, and that one beside the angle."""
-    rows, names = complete_rows(condition), summary_names(condition)
+    """The angle of repose, or else the number that the declared model missed most, and that one beside the angle.
+
+    A single replicate counts with the uncertainty that is stated for it.
+    """
+    measured = replicates_of(condition)
+    rows, names = measured.values, measured.summaries
     before = diagnosis.before.blocks[[one.name for one in diagnosis.conditions].index(condition.name)]
-    if min(len(rows), len(before)) < 2:
+    if len(rows) < 1 or len(before) < 2:
         return []
-    sd = rows.std(axis=0, ddof=1)
+    alone = len(rows) == 1
+    sd = measured.instrument if alone else rows.std(axis=0, ddof=1)
     missed = np.abs(before.mean(axis=0) - rows.mean(axis=0)) / np.where(sd > 0.0, sd, np.inf)
     allowed = [k for k, name in enumerate(names) if name in observable_names(scene) and sd[k] > 0.0]
     order = sorted(allowed, key=lambda k: (names[k] != "angle_of_repose_deg", -missed[k]))
@@ -109,9 +113,9 @@ def _targets(condition: Condition, diagnosis: Diagnosis, scene: Scene) -> list[d
         {
             "observable": names[k],
             "mean": float(rows[:, k].mean()),
-            "n": len(rows),
+            **({} if alone else {"n": len(rows)}),
             "sd": float(sd[k]),
-            "sd_source": "measured",
+            "sd_source": "stated" if alone else "measured",
             "margin": float(sd[k]),
             "before_mean": float(before[:, k].mean()),
             "before_sd": float(before[:, k].std(ddof=1)),

@@ -26,9 +26,8 @@ import numpy.typing as npt
 import rerun as rr
 import trimesh
 
-from doe.diagnose.diagnosis import complete_rows
+from doe.diagnose.diagnosis import replicates_of
 from doe.measurement.measurement import Condition, Role
-from doe.measurement.summaries import summary_names
 from doe.run_records import Run, sample_of
 from doe.studies.study_result import StudyResult
 from explorer.diagnosis.piles import HeightSurface, answer_piles
@@ -211,15 +210,18 @@ def _measured_discharge(condition: Condition) -> tuple[Array, Array] | None:
 
 
 def _numbers(result: DiagnosisResult, condition: Condition) -> str:
-    """Every number of ``condition``: measured mean ± SD, and the means of both models' fresh pours."""
-    rows = complete_rows(condition)
-    measured = dict(zip(summary_names(condition), rows.T, strict=True))
+    """Every number of ``condition``: measured mean ± SD, or what is stated of a single one, and both models' means."""
+    measured = replicates_of(condition)
+    rows = measured.values
+    alone = len(rows) == 1
+    deviation = measured.instrument if alone else rows.std(axis=0, ddof=1)
+    data = dict(zip(measured.summaries, zip(rows.mean(axis=0), deviation, strict=True), strict=True))
     models = result.confirmation.before, result.confirmation.after
     poured = [one for model in models for one in model.conditions if one.condition == condition.name]
-    lines = [f"| number (n = {len(rows)}) | measured | before | after |", "|-|-|-|-|"]
+    spread = "stated" if alone else "SD"
+    lines = [f"| number (n = {len(rows)}) | measured ± {spread} | before | after |", "|-|-|-|-|"]
     for k, name in enumerate(next(one.summaries for one in result.measured if one.condition == condition.name)):
-        data = measured.get(name, np.array([math.nan, math.nan]))
-        mean, sd = (feature_value(result, name, float(one)) for one in (data.mean(), data.std(ddof=1)))
+        mean, sd = (feature_value(result, name, float(one)) for one in data.get(name, (math.nan, math.nan)))
         means = " | ".join(feature_value(result, name, float(one.mean[k])) for one in poured)
         lines.append(f"| {feature_label(name)} | {mean} ± {sd} | {means} |")
     return "\n".join(lines)

@@ -93,7 +93,10 @@ def _broken(numerics: Numerics, moment: Moment) -> Verdict:
     if row["overflow"]:
         return Outcome.BUFFER_OVERFLOW, f"more than {moment.room} entries in the contact list"
     if row["lost"]:
-        return Outcome.LOST_BODY, f"{row['lost']:.0f} left the domain without coming out of the outlet, or through the plate"
+        return (
+            Outcome.LOST_BODY,
+            f"{row['lost']:.0f} left the domain without coming out of the outlet, or through the plate",
+        )
     if row["overlap"] > numerics.overlap_limit:
         return Outcome.OVERLAP_LIMIT, f"overlap of {row['overlap']:.3g} radii at {moment.time:.3f} s"
     return RUNNING

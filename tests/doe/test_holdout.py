@@ -1,12 +1,18 @@
 """Holdout errors by hand, and the skill of models that are right, half right and wrong."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from doe.errors import StatisticsError
-from doe.holdout import OVERALL, HoldoutCondition, holdout_errors
+from doe.holdout import OVERALL, HoldoutCondition, MeasuredReplicates, holdout_errors
+
+
+def compared(names, measured, before, after, stated=0.0, mean_of=1):
+    data = MeasuredReplicates("c", names, measured, np.full(len(names), stated), mean_of)
+    return HoldoutCondition(data, before, after)
 
 
 def condition(bias_before, bias_after, seed=0, n=8, m=20, names=("angle", "height"), scale=(1.0, 0.01)):
@@ -15,13 +21,13 @@ def condition(bias_before, bias_after, seed=0, n=8, m=20, names=("angle", "heigh
     def pours(count, bias):
         return (10 + np.asarray(bias) + generator.standard_normal((count, len(names)))) * np.asarray(scale)
 
-    return HoldoutCondition("c", names, pours(n, 0.0), pours(m, bias_before), pours(m, bias_after))
+    return compared(names, pours(n, 0.0), pours(m, bias_before), pours(m, bias_after))
 
 
 def test_errors_by_hand():
     """Means 2 and 5: before off by 3. s^2/n: 2/2 and 2/2, so the floor is sqrt(2); after is exact."""
     two, five = np.array([[1.0], [3.0]]), np.array([[4.0], [6.0]])
-    rows = holdout_errors([HoldoutCondition("c", ("x",), two, five, two)])
+    rows = holdout_errors([compared(("x",), two, five, two)])
     assert [row.observable for row in rows] == ["x", OVERALL]
     assert (rows[0].before, rows[0].after) == (pytest.approx(3.0), pytest.approx(0.0))
     assert rows[0].noise_floor == pytest.approx(np.sqrt(2))
@@ -33,7 +39,7 @@ def test_errors_by_hand():
 def test_the_standard_deviation_of_a_pour_is_pooled():
     """By hand: squares 2 of two measured pours and 0 of two simulated ones, two degrees of freedom: s = 1."""
     measured, constant = np.array([[1.0], [3.0]]), np.array([[4.0], [4.0]])
-    row = holdout_errors([HoldoutCondition("c", ("x",), measured, measured, constant)])[-1]
+    row = holdout_errors([compared(("x",), measured, measured, constant)])[-1]
     assert row.after == pytest.approx(2.0)
     assert row.noise_floor == pytest.approx(1.0)
 
@@ -76,14 +82,37 @@ def test_a_right_model_is_at_the_noise_floor_and_covers():
 
 def test_a_base_model_within_the_noise_has_no_skill_to_gain():
     data = condition(0.0, 0.0)
-    row = holdout_errors([HoldoutCondition("c", data.summaries, data.measured, data.measured, data.after)])[-1]
+    row = holdout_errors([replace(data, before=data.measured.values)])[-1]
     assert np.isnan(row.skill)
     assert row.to_dict()["skill_low"] is None
 
 
-def test_single_replicates_are_refused():
+def test_too_few_pours_and_no_data_are_refused():
     data = condition(0.0, 0.0)
-    with pytest.raises(StatisticsError, match="at least 2"):
-        holdout_errors([HoldoutCondition("c", data.summaries, data.measured[:1], data.before, data.after)])
+    with pytest.raises(StatisticsError, match="at least 1, 2 and 2"):
+        holdout_errors([replace(data, before=data.before[:1])])
+    with pytest.raises(StatisticsError, match="measured 0, "):
+        holdout_errors([replace(data, measured=replace(data.measured, values=data.measured.values[:0]))])
     with pytest.raises(StatisticsError, match="no condition"):
         holdout_errors([])
+
+
+def test_a_single_reading_has_the_scatter_of_pours_and_its_instrument():
+    """By hand: the mean of two pours of variance 2 and u² = 3 make a deviation of 2; the pours' mean has 2/2."""
+    before, after = np.array([[4.0], [6.0]]), np.array([[1.0], [3.0]])
+    rows = holdout_errors([compared(("x",), np.array([[4.0]]), before, after, stated=np.sqrt(3.0), mean_of=2)])
+    assert (rows[0].before, rows[0].after) == (pytest.approx(1.0), pytest.approx(2.0))
+    assert rows[0].noise_floor == pytest.approx(np.sqrt(4.0 + 1.0))
+    assert rows[1].after == pytest.approx(1.0)
+
+
+def test_single_readings_of_a_right_model_are_at_the_noise_floor_and_covered():
+    rng = np.random.default_rng(3)
+    found = []
+    for seed in range(300):
+        reading = np.sqrt(1.0 + 0.5**2) * rng.standard_normal((1, 2))
+        pours = [rng.standard_normal((20, 2)) for _ in range(2)]
+        found.append(holdout_errors([compared(("a", "b"), reading, *pours, stated=0.5)], samples=50, seed=seed)[-1])
+    # The floor is by 20 pours; 600 squares of a normal number leave 0.06 of their mean.
+    assert np.mean([row.ratio**2 for row in found]) == pytest.approx(19.0 / 17.0, abs=0.18)
+    assert np.mean([row.coverage_after for row in found]) == pytest.approx(0.9, abs=0.04)

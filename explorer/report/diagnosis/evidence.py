@@ -59,6 +59,10 @@ ERROR_CAPTION = (
     "above), 0 no gain, – where the declared model is within the noise already. Inside 90 %: share of measured pours "
     "in the model's 90 % predictive interval."
 )
+ALONE = (
+    " A condition measured once does not tell its scatter: its error is the stated uncertainty and the scatter of "
+    "fresh pours, and its standard deviation of a pour is of both."
+)
 
 
 def pours_of(result: DiagnosisResult, condition: str) -> str:
@@ -97,6 +101,8 @@ def error(result: DiagnosisResult) -> Section:
 
 
 def _error_table(result: DiagnosisResult, role: Role, caption: str) -> Table:
+    if any(row.replicates == 1 for row in result.measured if row.role == role):
+        caption += ALONE
     return Table(ERROR_HEADER, tuple(_error_row(result, row) for row in result.error.of(role)), caption)
 
 

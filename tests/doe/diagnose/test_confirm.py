@@ -6,9 +6,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from doe.diagnose.confirm import CONTRADICTED, Confirmed, HeldOutData, confirming, held_out, residual_maps
+from doe.diagnose.confirm import CONTRADICTED, Confirmed, confirming, held_out, residual_maps
 from doe.diagnose.result import CalibratedModel
+from doe.holdout import MeasuredReplicates
 from doe.measurement import load_measurement
 from doe.measurement.piles import PileSurface
 from doe.measurement.residual_map import LEAST_ERROR, height_difference
@@ -84,10 +86,39 @@ def test_the_points_that_confirm_are_those_that_were_poured():
 
 
 def test_held_out_numbers_that_are_zero_in_every_pour_contradict_nothing():
-    empty = HeldOutData("empty", ("residual_mass_kg",), np.zeros((3, 1)))
+    empty = MeasuredReplicates("empty", ("residual_mass_kg",), np.zeros((3, 1)), np.zeros(1))
     assert held_out("base", [empty], [np.zeros((8, 1))]) is None
-    off = HeldOutData("off", ("height",), np.array([[5.0], [5.1], [4.9]]))
+    off = MeasuredReplicates("off", ("height",), np.array([[5.0], [5.1], [4.9]]), np.zeros(1))
     found = held_out("base", [empty, off], [np.zeros((8, 1)), np.linspace(-0.1, 0.1, 8)[:, None]])
     assert found is not None
     assert found.condition == "off"
     assert found.p < CONTRADICTED
+
+
+def test_a_single_held_out_reading_is_held_against_its_instrument_and_the_scatter_of_pours():
+    """By hand: s = 1 of five pours, u = 2, and the mean of four: (1/4 + 1/5) + 4 = 4.45, f = 4 (4.45/0.45)² = 391."""
+    poured = np.array([[-1.0], [-1.0], [0.0], [1.0], [1.0]])
+    one = MeasuredReplicates("curve", ("mass",), np.array([[6.0]]), np.array([2.0]), 4)
+    found = held_out("base", [one], [poured])
+    assert found is not None
+    assert found.farthest == pytest.approx(6.0 / np.sqrt(4.45))
+    assert found.p == pytest.approx(2.0 * stats.t.sf(6.0 / np.sqrt(4.45), 4.0 * (4.45 / 0.45) ** 2))
+    # Without a statement its scatter is that of the pours: t with four degrees of freedom.
+    plain = held_out("base", [replace(one, stated=np.zeros(1), mean_of=1)], [poured])
+    assert plain is not None
+    assert plain.p == pytest.approx(2.0 * stats.t.sf(6.0 / np.sqrt(1.2), 4))
+
+
+def test_a_right_model_is_seldom_contradicted_by_single_readings():
+    """A tenth of the answers is below p = 0.1, for readings with an instrument of 0, 1 and 5 deviations of a pour."""
+    rng = np.random.default_rng(5)
+    for stated in (0.0, 1.0, 5.0):
+        below = 0
+        for _ in range(2000):
+            value = np.hypot(1.0, stated) * rng.standard_normal((1, 1))
+            one = MeasuredReplicates("curve", ("mass",), value, np.array([stated]))
+            found = held_out("base", [one], [rng.standard_normal((8, 1))])
+            assert found is not None
+            below += found.p < 0.1
+        # Three binomial standard errors; Welch and Satterthwaite are approximate within that.
+        assert below / 2000 == pytest.approx(0.1, abs=0.02)

@@ -22,7 +22,7 @@ from doe.diagnose.budget import Budget
 from doe.diagnose.confirm import confirming
 from doe.diagnose.diagnosis import complete_rows, fresh_pours
 from doe.diagnose.result import CalibratedModel
-from doe.holdout import HoldoutCondition, holdout_errors
+from doe.holdout import HoldoutCondition, MeasuredReplicates, holdout_errors
 from doe.measurement import load_measurement, summary_names
 from doe.store import Store, default_store
 from doe.validation.campaign import Answers, CampaignOrder, measured_strengths
@@ -54,7 +54,8 @@ def ratio(rows, generator=None):
     for name, names, first, values in rows:
         order = np.arange(len(values)) if generator is None else generator.permutation(len(values))
         measured, fresh = values[order[:first]], values[order[first:]]
-        conditions.append(HoldoutCondition(name, names, measured, fresh, fresh))
+        replicates = MeasuredReplicates(name, names, measured, np.zeros(len(names)))
+        conditions.append(HoldoutCondition(replicates, fresh, fresh))
     return holdout_errors(conditions, samples=2)[-1].ratio
 
 

@@ -1,5 +1,7 @@
 """The study that a diagnosis writes beside the corrected material: it can be read, and says what came before."""
 
+from dataclasses import replace
+
 import pytest
 
 from doe.studies.study import load_study, with_profile
@@ -39,6 +41,26 @@ def test_its_targets_are_measured_and_hold_what_the_declared_model_gave(tmp_path
         assert target.before_mean is not None
         assert abs(target.before_mean - target.mean) > 0.0
         assert target.before_n == len(found.before.blocks[0])
+
+
+def test_the_targets_of_a_single_curve_have_the_uncertainty_that_is_stated(tmp_path):
+    measurement, found = diagnosed(**CASES["effect"])
+    single = []
+    for condition in measurement.conditions:
+        first = [
+            replace(one, values=one.values[:1], uncertainty=0.03 * float(abs(one.values[0]).max()))
+            for one in condition.observations
+        ]
+        single.append(replace(condition, observations=tuple(first), replicates=1, surfaces={}))
+    (tmp_path / "corrected.toml").write_text(corrected_toml(measurement, found), encoding="utf-8")
+    path = tmp_path / "corrected_study.toml"
+    path.write_text(study_toml(replace(measurement, conditions=tuple(single)), found, "corrected.toml"), "utf-8")
+    study = load_study(str(path))
+    assert study.targets
+    for target in study.targets:
+        one = single[0].offered[target.observable]
+        assert (target.mean, target.n, target.sd_source) == (pytest.approx(one.values[0].item()), None, "stated")
+        assert target.sd == pytest.approx(one.uncertainty)
 
 
 @pytest.mark.parametrize("case", ["nothing", "ambiguous", "unexplained", "not carried over"])
