@@ -10,6 +10,7 @@ from __future__ import annotations
 import queue
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, TypeVar
@@ -136,6 +137,7 @@ class BackgroundWork:
 
     def __init__(self, post: Post) -> None:
         self._post, self._busy_with = post, ""
+        self._next: deque[Callable[[], None]] = deque()
 
     @property
     def busy_with(self) -> str:
@@ -152,6 +154,15 @@ class BackgroundWork:
         self._busy_with = what
         threading.Thread(target=self._run, args=(what, work, done), daemon=True, name="explorer-background").start()
 
+    def start_when_free(self, what: str, work: Callable[[], Found], done: Callable[[Found], None]) -> None:
+        """The same at once, or as soon as what is being done is done: for what would be lost by a refusal."""
+        self._next.append(lambda: self.start(what, work, done))
+        self._go_on()
+
+    def _go_on(self) -> None:
+        if not self._busy_with and self._next:
+            self._next.popleft()()
+
     def _run(self, what: str, work: Callable[[], Found], done: Callable[[Found], None]) -> None:
         try:
             found = work()
@@ -166,8 +177,12 @@ class BackgroundWork:
 
     def _finish(self, done: Callable[[Found], None], found: Found) -> None:
         self._busy_with = ""
-        done(found)
+        try:
+            done(found)
+        finally:
+            self._go_on()
 
     def _refuse(self, error: Exception) -> None:
         self._busy_with = ""
+        self._go_on()
         raise error

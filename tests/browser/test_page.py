@@ -224,6 +224,7 @@ def test_a_slider_moved_by_keyboard_in_one_browser_is_seen_in_another(page, addr
     second.get_by_text("Static friction").filter(visible=True).first.wait_for()
     top = re.compile(r"In the solver: Static friction [1-9]")
     to_its_end(second, "Static friction", "End", top)
+    room(page, "Set-up")
     page.get_by_text(top).wait_for()
     # On the timeline's mark, not in the line of the newest event: the pile may have come to rest meanwhile.
     page.locator("#timeline .event[title*='· browser ']").first.wait_for(state="attached")

@@ -19,7 +19,7 @@ class PourLink(Panel):
 
     def _take(self, text: object) -> None:
         begun = self._page.project.source
-        self._page.background.start("reading the link", lambda: read_pour(str(text), begun), self._pour)
+        self._page.background.start_when_free("reading the link", lambda: read_pour(str(text), begun), self._pour)
 
     def _pour(self, linked: LinkedPour) -> None:
         session = self._page.session
