@@ -21,7 +21,7 @@ from doe.diagnose.confirm import (
     model_of,
     residual_maps,
 )
-from doe.diagnose.posterior import Posterior
+from doe.diagnose.posterior import Posterior, gain_by_pours
 from doe.diagnose.result import NO_EFFECT, HeldOut, Level, Offered, Suggestion
 from doe.diagnose.training_pours import Say, TrainingPours
 from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD, Verdict, taken_back, verdict_of
@@ -43,6 +43,8 @@ FRESH = 8
 SETTLED, QUIET = 0.95, 0.8
 """Probability of an effect that has had a closer look, and of nothing, from which on no further look is taken; where
 the most probable effect has had one, ``NOTHING_FROM`` of nothing will do, for more pours add nothing to the data."""
+LITTLE = 0.1
+"""Rise of a log evidence that changes nothing: by a tenth of the odds, before ``TEMPERATURE``."""
 FIRST_OTHER_ROOT = 100
 """Roots of other seeds begin here: below it are those of laboratories and of reference pours."""
 MOST_RIVALS = 4
@@ -93,11 +95,12 @@ def run_diagnosis(
     on_pour: OnPour | None = None,
     seed: int = 0,
     follow_up: Measurement | None = None,
+    plan_next: bool = True,
 ) -> Diagnosis:
     """Diagnose ``measurement`` against its declared model, with ``effects`` as candidates.
 
     Data sets of one model share their pours; those of another ``seed`` are others. The conditions of
-    a ``follow_up`` are fitted as well.
+    a ``follow_up`` are fitted as well. ``plan_next``: whether an ambiguous answer pours what could be measured next.
     """
     declared, paths = declare(measurement, effects), [p.path for p in measurement.parameters]
     if follow_up is not None:
@@ -114,7 +117,7 @@ def run_diagnosis(
     say(f"verdict: {verdict.kind}")
     confirmed, verdict = concluded(verdict, compared, declared, measurement.conditions, everywhere, say)
     candidates = CandidateExperiments((), 0)
-    if follow_up is None:
+    if follow_up is None and plan_next:
         candidates = suggested(verdict, compared.posterior, training, measurement.fit, pours_in)
     return Diagnosis(
         declared=declared,
@@ -164,8 +167,12 @@ def pursued(training: TrainingPours, conditions: Sequence[Condition], budget: Bu
         name, p = found.best if found.effects else ("", 0.0)
         quiet = NOTHING_FROM if name in looked else QUIET
         settled = found.nothing >= quiet or (p >= SETTLED and name in looked)
-        if settled and not any(training.ways[way].effect == name for way, _ in training.at_end(found)):
-            break
+        if not any(training.ways[way].effect == name for way, _ in training.at_end(found)):
+            if settled:
+                break
+            if name in looked and (rival := inseparable(compared, name)):
+                say(f"no pours tell {name} from {rival}: what is between them is within the noise of the data")
+                break
         poured = training.look(found)
         if not poured:
             break
@@ -180,6 +187,20 @@ def pursued(training: TrainingPours, conditions: Sequence[Condition], budget: Bu
         label = compared.posterior.best[0]
         return compared.refitted(("base", label))
     return compared
+
+
+def inseparable(compared: Compared, name: str) -> str:
+    """An answer that no number of pours tells from the effect ``name`` and that keeps it from a name; "" for none.
+
+    A name takes ``THRESHOLD``, which it cannot get while another answer holds the rest by itself.
+    """
+    found = compared.posterior
+    everything = {**found.effects, "base": found.nothing}
+    rivals = [label for label, p in everything.items() if label != name and p > 1.0 - THRESHOLD]
+    for label in rivals:
+        if gain_by_pours(found.fits[name], found.fits[label], compared.emulator, compared.data) < LITTLE:
+            return "nothing missing" if label == "base" else label
+    return ""
 
 
 def concluded(

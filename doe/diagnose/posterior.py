@@ -103,6 +103,8 @@ class Fit:
     z, variance
         What it gives at its best amplitude and parameters, (D,), and the variance of the data about that which neither
         parameters nor instruments make.
+    unsure
+        The part of that variance that more pours of the model would take away, u, (D,).
     log_evidence
         ln Z.
     p
@@ -115,6 +117,7 @@ class Fit:
     theta_covariance: FloatArray
     z: FloatArray
     variance: FloatArray
+    unsure: FloatArray
     log_evidence: float
     p: float
 
@@ -256,6 +259,24 @@ def fitted(emulator: Emulator, data: Data, label: str) -> Fit:
     return weigher.fit(label, names, nodes.rows, nodes.natural, nodes.ends, weigher.densities(nodes.rows))
 
 
+def gain_by_pours(one: Fit, other: Fit, emulator: Emulator, data: Data) -> float:
+    """By how much the log evidence of one model over another would rise at most were both known exactly.
+
+    The expected log evidence of a right model over a wrong one is ½ Δᵀ S⁻¹ Δ, Δ between what the two give and S the
+    covariance of the data about them; with u left out of S it is what any number of pours could make of it. Where the
+    data's own noise is most of S, that is nothing.
+    """
+    instrument = data.instrument if data.instrument.size else np.zeros((len(data.z), 0))
+    loadings = np.concatenate([emulator.slopes, instrument], axis=1)
+    apart = (one.z - emulator.slopes @ one.theta) - (other.z - emulator.slopes @ other.theta)
+    noise, unsure = 0.5 * (one.variance + other.variance), 0.5 * (one.unsure + other.unsure)
+    now, then = (
+        0.5 * float(apart @ np.linalg.solve(np.diag(left) + loadings @ loadings.T, apart))
+        for left in (noise, noise - unsure)
+    )
+    return then - now
+
+
 def priors_of(effects: Sequence[str]) -> dict[str, float]:
     """Prior probability of "base", of "outside" and of each of ``effects`` alone."""
     rest = 1.0 - NOTHING - OUTSIDE - PAIRS
@@ -389,6 +410,7 @@ class _Weigher:
             covariance,
             mean + slopes @ theta,
             noise,
+            self._emulator.at(rows[best : best + 1])[1][0],
             float(logsumexp(logs)) - math.log(len(logs)),
             float(stats.f.sf(square, len(d), self._emulator.freedom)),
         )

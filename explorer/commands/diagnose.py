@@ -25,6 +25,9 @@ def diagnose(
     given: Path | None = typer.Option(
         None, metavar="DIR", help="A finished diagnosis: with its effect in the model, what else is missing?"
     ),
+    plan_next: bool = typer.Option(
+        True, "--next/--no-next", help="Pour what could be measured next if the answer is ambiguous."
+    ),
     author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
     notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
     apply: bool = typer.Option(False, "--apply", help="Also write the corrected material as OUT/corrected.toml."),
@@ -57,6 +60,7 @@ def diagnose(
         seed=seed,
         follow_up=follow_up,
         given=given,
+        plan_next=plan_next,
         author=author,
         notes=notes,
         record=record,

@@ -160,6 +160,7 @@ class DiagnosisOrder(Record):
     seed: int
     follow_up: str | None
     given: str | None = None
+    plan_next: bool = True
 
 
 @dataclass(frozen=True)

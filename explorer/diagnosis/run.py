@@ -91,6 +91,8 @@ class DiagnoseOrder:
     notes: str = ""
     record: Path | None = None
     """New file for the answer as a recording."""
+    plan_next: bool = True
+    """Whether an ambiguous answer pours what could be measured next."""
     scheduler: str = ""
     """Address of a Dask scheduler whose workers pour; "" for processes of this machine."""
 
@@ -187,7 +189,16 @@ def _run(
         stack.callback(store.close)
         pours = reporter.watched(pool.run_queue)
         found = run_diagnosis(
-            measurement, store, pours, names, budget, progress.stage, progress.pour, order.seed, follow_up
+            measurement,
+            store,
+            pours,
+            names,
+            budget,
+            progress.stage,
+            progress.pour,
+            order.seed,
+            follow_up,
+            order.plan_next,
         )
     result = result_of(measurement, order, earlier.given, found, reporter.elapsed)
     text = json.dumps(result.to_dict(), ensure_ascii=False, allow_nan=False, indent=1)
@@ -197,6 +208,8 @@ def _run(
     say(f"{order.out}/report.html, report.md, {result.NAME}")
     if missing:
         say(missing)
+    if result.kind == "ambiguous" and not order.plan_next:
+        say("what to measure next: not looked for, as asked; the same with --resume and without --no-next adds it")
     if found.suggestions:
         following = order.out / "next"
         if (following / ORDER).is_file():  # of a run that was stopped later, or one that is gone on with
@@ -233,6 +246,7 @@ def _finished(order: DiagnoseOrder) -> DiagnosisResult | None:
         order.seed,
         _absolute(order.follow_up),
         _absolute(order.given),
+        order.plan_next,
     )
     usual = DiagnosisOrder(result.order.out, (), None, 0, None)
     known = replace(result.order, follow_up=_absolute(result.order.follow_up), given=_absolute(result.order.given))

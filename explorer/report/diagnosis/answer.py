@@ -309,6 +309,8 @@ def _of_bounds(row: EffectRow) -> list[str]:
 
 
 def _asked_for(result: DiagnosisResult) -> str:
+    if not result.order.plan_next:
+        return "What could tell them apart was not looked for (`--no-next`)."
     if not result.next_experiment:
         return "No change of the rig that was tried would tell them apart."
     first = result.next_experiment[0]
