@@ -116,8 +116,11 @@ def measurement(monkeypatch):
     return found
 
 
-def measure(monkeypatch, effects, seed, formula=expected, held_out=None):
-    """Let the laboratory read the formula with ``effects``, in the fitted and in the held-out conditions."""
+def measure(monkeypatch, effects, seed, formula=expected, held_out=None, instrument=0.0):
+    """Let the laboratory read the formula with ``effects``, in the fitted and in the held-out conditions.
+
+    ``instrument``: the error that it states of each number, without making one.
+    """
     monkeypatch.setattr(FormulaPours, "formula", staticmethod(formula))
     rng = np.random.default_rng(seed)
 
@@ -129,7 +132,7 @@ def measure(monkeypatch, effects, seed, formula=expected, held_out=None):
     def measured(condition, offer=None):
         names = summary_names(condition)
         return MeasuredFeatures(
-            condition.name, "scalars", names, replicates(condition), np.zeros(len(names)), 1, len(names)
+            condition.name, "scalars", names, replicates(condition), np.full(len(names), instrument), 1, len(names)
         )
 
     monkeypatch.setattr(diagnosis, "measured", measured)
@@ -247,6 +250,26 @@ def test_what_the_data_cannot_tell_apart_is_ambiguous_and_gets_a_next_experiment
     assert {"air_drag", "rolling_resistance"} <= set(found.verdict.names)
     assert found.suggestions
     assert found.suggestions[0].levers
+
+
+def test_no_more_is_poured_where_the_noise_of_the_data_hides_what_is_between_two_answers(measurement, monkeypatch):
+    planted = (("rolling_resistance", (0.6 * EFFECTS["rolling_resistance"].strongest,)),)
+    looks, fitted = {}, replace(measurement, conditions=measurement.fit)
+    for instrument in (0.05, 2.0):
+        measure(monkeypatch, planted, 1, twins, instrument=instrument)
+        said = []
+        found = diagnosis.run_diagnosis(fitted, None, None, NAMES, BUDGET, said.append, plan_next=False)
+        assert found.verdict.kind.startswith("ambiguous:"), said
+        looks[instrument] = sum(line.startswith("after a closer look") for line in said)
+        assert any(line.startswith("no pours tell ") for line in said) == (instrument == 2.0), said
+    assert looks == {0.05: BUDGET.looks, 2.0: 1}
+
+
+def test_what_could_be_measured_next_is_left_out_where_it_is_not_wanted(measurement, monkeypatch):
+    measure(monkeypatch, (("air_drag", (1.0,)),), 1, twins, held_out=())
+    found = diagnosis.run_diagnosis(measurement, None, None, NAMES, BUDGET, print, plan_next=False)
+    assert found.verdict.kind.startswith("ambiguous:")
+    assert found.suggestions == ()
 
 
 def test_held_out_data_take_a_name_back(measurement, monkeypatch):

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,7 +22,20 @@ from doe.diagnose.emulator import (
     signature_prior,
     signature_scales,
 )
-from doe.diagnose.posterior import BEYOND, FITS, NOTHING, OUTSIDE, PAIRS, SPREADS, Data, log_t, multiples, posterior
+from doe.diagnose.posterior import (
+    BEYOND,
+    FITS,
+    NOTHING,
+    OUTSIDE,
+    PAIRS,
+    SPREADS,
+    Data,
+    Fit,
+    gain_by_pours,
+    log_t,
+    multiples,
+    posterior,
+)
 from doe.errors import StatisticsError
 from doe.validation.cross_validation import NULLS, PlantedTruth, Teaching, cross_validated
 from doe.validation.limit import RISKS, DataKind
@@ -429,3 +443,18 @@ def test_a_signature_that_is_only_noise_is_believed_to_be_small():
     assert scales[0] <= 0.03
     # The scale of 40 normal numbers has a standard error of √(2/40) = 0.22.
     assert np.all((scales[1:] > 0.4) & (scales[1:] < 2.0))
+
+
+def test_what_pours_could_gain_by_hand():
+    """Δ = 3 in one feature of variance 2, 1 of which more pours take away: ½ 9/1 − ½ 9/2; 8 more by an instrument."""
+
+    def fit(z):
+        return Fit("", (), np.zeros(1), np.zeros((1, 1)), np.array(z), np.full(2, 2.0), np.ones(2), 0.0, 0.5)
+
+    taught = SimpleNamespace(slopes=np.zeros((2, 1)))
+    plain, blurred = (Data(np.zeros(2), 1.0, instrument=np.diag([size, 0.0])) for size in (0.0, math.sqrt(8.0)))
+    assert gain_by_pours(fit([3.0, 1.0]), fit([0.0, 1.0]), taught, plain) == pytest.approx(2.25)
+    assert gain_by_pours(fit([3.0, 1.0]), fit([0.0, 1.0]), taught, blurred) == pytest.approx(0.5 - 0.45)
+    # What a parameter can do as well is nothing that they differ by.
+    turned = SimpleNamespace(slopes=np.array([[1e3], [0.0]]))
+    assert gain_by_pours(fit([3.0, 1.0]), fit([0.0, 1.0]), turned, plain) == pytest.approx(0.0, abs=1e-4)
