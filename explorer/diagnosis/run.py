@@ -198,7 +198,7 @@ def _run(
             progress.pour,
             order.seed,
             follow_up,
-            order.plan_next,
+            plan_next=order.plan_next,
         )
     result = result_of(measurement, order, earlier.given, found, reporter.elapsed)
     text = json.dumps(result.to_dict(), ensure_ascii=False, allow_nan=False, indent=1)

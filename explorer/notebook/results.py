@@ -106,6 +106,7 @@ def diagnose(
     seed: int = 0,
     follow_up: str | Path | None = None,
     given: str | Path | None = None,
+    plan_next: bool = True,
     apply: bool = False,
     say: Say = print,
 ) -> DiagnosisResult:
@@ -129,6 +130,8 @@ def diagnose(
         The folder ``next`` that an ambiguous answer left in its ``out``, filled in.
     given
         The ``out`` of a finished diagnosis: with its effect in the model, what else is missing?
+    plan_next
+        Whether an ambiguous answer pours what could be measured next.
     apply
         Also write the corrected material, ``corrected.toml``.
 
@@ -154,6 +157,7 @@ def diagnose(
         seed=seed,
         follow_up=None if follow_up is None else Path(follow_up),
         given=None if given is None else Path(given),
+        plan_next=plan_next,
     )
     with Reporter("diagnose", say) as reporter:
         return diagnosis_run.run_diagnose(order, reporter)

@@ -216,7 +216,7 @@ def asked(monkeypatch):
     """Calls of the loop that pours, which has the answer of a case ready, made from the data that it is asked about."""
     calls = []
 
-    def run_diagnosis(measurement, store, pours, effects, budget, stage, on_pour, seed, follow_up):
+    def run_diagnosis(measurement, store, pours, effects, budget, stage, on_pour, seed, follow_up, plan_next):
         calls.append((measurement, effects, follow_up))
         return diagnosed(**CASES["ambiguous"])[1]
 
