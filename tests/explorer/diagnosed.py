@@ -116,9 +116,10 @@ def scenes():
 
 
 def measured_condition(name, role, scene, block):
-    """Summaries, and height profiles for the picture of the pile."""
+    """Summaries, and height profiles for the picture of the pile; what is measured once has its uncertainty stated."""
+    alone = len(block) == 1
     observations = [
-        Observation(summary, unit_, None, block[:, k], None)
+        Observation(summary, unit_, None, block[:, k], 0.2 * float(SIZE[k]) if alone else None)
         for k, (summary, (unit_, *_)) in enumerate(SUMMARIES.items())
     ]
     observations.append(Observation("height_profile_m", "m", RADIUS, profiles(block), None, "piles"))
@@ -192,7 +193,15 @@ def along(direction, multiple):
 
 
 def diagnosed(
-    effects=(), outside=0.0, elsewhere=0.0, theta=(0.0, 0.0), holdout=True, carries_over=True, title="Made up", seed=0
+    effects=(),
+    outside=0.0,
+    elsewhere=0.0,
+    theta=(0.0, 0.0),
+    holdout=True,
+    carries_over=True,
+    title="Made up",
+    seed=0,
+    replicates=REPLICATES,
 ):
     """Measurement and diagnosis.
 
@@ -207,7 +216,7 @@ def diagnosed(
         sign = 1.0 if carries_over or role == "fit" else -1.0
         acting = {name: tuple(sign * a for a in multiples) for name, multiples in effects}
         strange = (outside if role == "fit" else elsewhere) * world.outside[c]
-        blocks.append(world.pours(draw, c, REPLICATES, world.shift(c, theta, acting) + strange))
+        blocks.append(world.pours(draw, c, replicates, world.shift(c, theta, acting) + strange))
     conditions = tuple(
         measured_condition(name, role, scene, block)
         for name, role, scene, block in zip(RIGS, roles, scenes(), blocks, strict=False)
@@ -246,7 +255,7 @@ def diagnosed(
         fit_error=errors_of(conditions, "fit", found),
         holdout_error=errors_of(conditions, "holdout", found),
         held_out=found.held_out,
-        maps=maps_of(blocks[0], found.before, found.after),
+        maps=maps_of(blocks[0], found.before, found.after) if replicates > 1 else (),
         suggestions=suggestions(verdict),
         pours=321,
         settings=240,
@@ -286,6 +295,7 @@ CASES = {
     "wrong elsewhere": {"elsewhere": 1.5},
     "does not fit": {"effects": (("adhesion_sjkr", (2.0,)),), "outside": 0.7},
     "at the edge": {"theta": (0.0, 1.8)},
+    "measured once": {"effects": (("adhesion_sjkr", (1.5,)),), "replicates": 1},
     "hostile": {"effects": (("adhesion_sjkr", (0.6,)),), "title": HOSTILE},
 }
 EXPECTED = {
@@ -301,6 +311,7 @@ EXPECTED = {
     "wrong elsewhere": "unexplained",
     "does not fit": "unexplained",
     "at the edge": "no_missing_effect",
+    "measured once": "effect:adhesion_sjkr",
     "hostile": "effect:adhesion_sjkr",
 }
 """Verdict of each case; the order of rivals is that of chance."""

@@ -25,7 +25,7 @@ from explorer.report.diagnosis.wording import (
     size_text,
     spelled,
 )
-from explorer.units import MISSING, code, enumeration, fixed, p_value, percent, signed
+from explorer.units import MISSING, code, counted, enumeration, fixed, p_value, percent, signed
 from solver.effects import EFFECTS
 
 FAR = 2.0
@@ -97,6 +97,7 @@ def _asking_further(result: DiagnosisResult) -> str:
 
 def in_short(result: DiagnosisResult) -> Section:
     """The answer for a reader who reads nothing else."""
+    fitted = sum(row.replicates for row in result.measured if row.role == "fit")
     blocks: list[Block] = [
         Text(verdict_sentence(result)),
         Facts(tuple(_facts(result))),
@@ -104,8 +105,8 @@ def in_short(result: DiagnosisResult) -> Section:
             "probabilities",
             probability_chart(result),
             f"Posterior probability of each answer (n = {sum(row.features for row in result.offered)} features of "
-            f"{sum(row.replicates for row in result.measured if row.role == 'fit')} measured pours); dashed: "
-            f"{percent(result.threshold)}, from which on an effect is named.",
+            f"{counted(fitted, 'measured pour')}); dashed: {percent(result.threshold)}, from which on an effect is "
+            "named.",
         ),
         _probability_table(result),
     ]
@@ -322,7 +323,7 @@ def _asked_for(result: DiagnosisResult) -> str:
 def _facts(result: DiagnosisResult) -> list[tuple[str, str]]:
     compared = {row.condition: row.features for row in result.offered}
     measured = ", ".join(
-        f"{row.condition} ({'fitted' if row.role == 'fit' else 'held out'}, {row.replicates} pours, "
+        f"{row.condition} ({'fitted' if row.role == 'fit' else 'held out'}, {counted(row.replicates, 'pour')}, "
         + (
             f"{compared[row.condition]} features compared)"
             if row.condition in compared

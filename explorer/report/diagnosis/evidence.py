@@ -29,6 +29,7 @@ from explorer.report.diagnosis.wording import (
 from explorer.units import (
     MISSING,
     code,
+    counted,
     fixed,
     p_value,
     parameter_label,
@@ -69,7 +70,7 @@ def pours_of(result: DiagnosisResult, condition: str) -> str:
     """How many pours a condition has: "n = 5 measured pours and 20 fresh ones of each model"."""
     measured = next(row.replicates for row in result.measured if row.condition == condition)
     fresh = [row.pours for row in result.confirmation.after.conditions if row.condition == condition]
-    return f"n = {measured} measured pours" + (f" and {fresh[0]} fresh ones of each model" if fresh else "")
+    return f"n = {counted(measured, 'measured pour')}" + (f" and {fresh[0]} fresh ones of each model" if fresh else "")
 
 
 def error(result: DiagnosisResult) -> Section:
@@ -89,8 +90,8 @@ def error(result: DiagnosisResult) -> Section:
             Figure(
                 "error",
                 error_chart(result, "holdout"),
-                f"Root-mean-square errors of fresh pours over the noise floor, n = {held_out} measured pours that no "
-                "model was fitted to; a perfect model lies about 1.",
+                "Root-mean-square errors of fresh pours over the noise floor, n = "
+                f"{counted(held_out, 'measured pour')} that no model was fitted to; a perfect model lies about 1.",
             ),
             Folded("On fitted conditions", (_error_table(result, "fit", ""),)),
         ]

@@ -17,7 +17,7 @@ from explorer.report.diagnosis.wording import (
     model_words,
     spelled,
 )
-from explorer.units import code, duration, enumeration, fixed, number, p_value, parameter_label, percent
+from explorer.units import code, counted, duration, enumeration, fixed, number, p_value, parameter_label, percent
 
 OFFERS = {"scalars": "scalars", "profile": "scalars and height profiles", "scan": "scalars and scans of the surface"}
 
@@ -61,7 +61,10 @@ def data(result: DiagnosisResult) -> Section:
         if scatter <= 1.0
         else f"with {fixed(scatter)} times the variance of simulated ones, and the noise of the data is widened by that"
     )
-    blocks.append(Text(f"Measured pours of a condition scatter {words}."))
+    if all(row.replicates == 1 for row in result.measured if row.role == "fit"):
+        blocks.append(Text("No condition was measured twice: pours are taken to scatter as simulated ones do."))
+    else:
+        blocks.append(Text(f"Measured pours of a condition scatter {words}."))
     return Section("Data", tuple(blocks))
 
 
@@ -137,7 +140,7 @@ def _result(result: DiagnosisResult) -> str:
 
 def _pours(result: DiagnosisResult, condition: str) -> str:
     (pours,) = (row.replicates for row in result.measured if row.condition == condition)
-    return f"{pours} pours"
+    return counted(pours, "pour")
 
 
 def how_reached(result: DiagnosisResult) -> Section:
