@@ -7,6 +7,7 @@ import pytest
 import rerun as rr
 
 from explorer.errors import CommandError
+from explorer.recordings import recording_reader
 from explorer.recordings.pour_log import PourLog
 from explorer.recordings.recording_reader import _scene, read_recording
 from explorer.scene.file import load_scene, with_settings
@@ -150,6 +151,15 @@ def test_a_recording_of_another_program_is_refused_in_one_line(tmp_path):
     stream.disconnect()
     with pytest.raises(CommandError, match=r"^\S*other\.rrd: cannot be read as a recording: .+$"):
         read_recording(tmp_path / "other.rrd")
+
+
+def test_a_damaged_file_that_would_end_the_process_is_refused_in_one_line(scene, tmp_path, monkeypatch):
+    """rerun's reader aborted for 8 of 1500 damaged files of `make fuzz`: memory that there is not, a panic."""
+    with PourLog(tmp_path / "pour.rrd", scene, seed=1) as log:
+        log.frame(0.0, poses(0), {})
+    monkeypatch.setattr(recording_reader, "TRIAL", "import os; os.abort()")
+    with pytest.raises(CommandError, match=r"^\S+\.rrd: cannot be read as a recording: it is damaged$"):
+        read_recording(tmp_path / "pour.rrd")
 
 
 @pytest.mark.parametrize("name", ["my seed", "a+b", "a/b", "/a//b/", "körner", "😀", "10 %", "a\\b", "two\nlines"])
