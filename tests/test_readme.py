@@ -217,7 +217,7 @@ def test_python_runs_as_it_is_written(document, checkout, monkeypatch):
     case = cache(lambda: diagnosed.diagnosed(**diagnosed.CASES["effect"]))
     monkeypatch.setattr(study_run, "PourRunner", Formula)
     monkeypatch.setattr(diagnosis_run, "load_measurement", lambda folder: case()[0])
-    monkeypatch.setattr(diagnosis_run, "run_diagnosis", lambda *given: case()[1])
+    monkeypatch.setattr(diagnosis_run, "run_diagnosis", lambda *given, **options: case()[1])
     monkeypatch.setenv("REPOSE_STORE", str(checkout / "pours.sqlite"))
     monkeypatch.chdir(checkout)
     exec(compile("\n".join(blocks), document, "exec"), {})

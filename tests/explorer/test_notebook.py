@@ -314,7 +314,7 @@ def diagnosis(tmp_path_factory):
     folder = tmp_path_factory.mktemp("diagnosis") / "out"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(diagnosis_run, "load_measurement", lambda folder: measurement)
-        patch.setattr(diagnosis_run, "run_diagnosis", lambda *given: found)
+        patch.setattr(diagnosis_run, "run_diagnosis", lambda *given, **options: found)
         store = folder.parent / "pours.sqlite"
         result = explorer.diagnose(
             "trefoil_2", folder, effects=["adhesion_sjkr"], store=store, apply=False, say=lambda line: None
