@@ -1,5 +1,6 @@
 """The example of a slot hopper: its table is what its script makes of the measured curve."""
 
+import math
 import runpy
 from pathlib import Path
 
@@ -23,12 +24,20 @@ def test_a_steady_flow_that_ends_is_cut_where_the_charge_is_left():
     assert later[-1] == pytest.approx(6.0 - 3.1)
 
 
-def test_the_table_is_made_of_the_curve(capsys):
-    SCRIPT["main"](str(EXAMPLE / "plastic_spheres.csv"), "2.344")
-    assert capsys.readouterr().out == (EXAMPLE / "spheres.csv").read_text()
+@pytest.mark.parametrize(("bodies", "mass"), [("spheres", "2.344"), ("cylinders", "2.495")])
+def test_the_table_is_made_of_the_curve(bodies, mass, capsys):
+    SCRIPT["main"](str(EXAMPLE / f"plastic_{bodies}.csv"), mass)
+    assert capsys.readouterr().out == (EXAMPLE / f"{bodies}.csv").read_text()
 
 
 def test_it_can_be_read():
-    found = reach_of(load_measurement(EXAMPLE))
-    assert (found.equations, found.unknowns, found.has_discharge) == (9, 2, True)
+    measurement = load_measurement(EXAMPLE)
+    found = reach_of(measurement)
+    assert (found.equations, found.unknowns, found.has_discharge, found.has_holdout) == (9, 2, True, True)
+    # The held-out cylinders are those of the source: mass and inertia of a solid cylinder.
+    (body,) = measurement.holdout[0].scene.bodies
+    mass = 1128.0 * math.pi * 2e-3**2 * 8e-3
+    assert body.clump.mass == pytest.approx(mass, rel=1e-3)
+    across = mass * (3.0 * 2e-3**2 + 8e-3**2) / 12.0
+    assert tuple(body.clump.inertia) == pytest.approx((across, across, 0.5 * mass * 2e-3**2), rel=2e-3)
     assert "rolling_resistance" not in found.hidden_effects
