@@ -4,6 +4,9 @@ A slot's flow does not depend on how high the bin is filled while the flow is st
 measured charge are a pour of their own. It begins where the straight line through the steady part leaves so much:
 
     python reduced_charge.py plastic_spheres.csv 2.344 > spheres.csv
+    python reduced_charge.py plastic_cylinders.csv 2.495 residual > cylinders.csv
+
+With ``residual`` only what stays is told: a flow that is not steady leaves open when the last charge begins.
 """
 
 import csv
@@ -34,12 +37,12 @@ def reduced(time: np.ndarray, fraction: np.ndarray, mass: float) -> tuple[float,
     return float(rate), time[later] - begun, mass * fraction[later] - (mass - CHARGE)
 
 
-def main(path: str, mass: str) -> None:
-    """Print the table."""
+def main(path: str, mass: str, only: str = "") -> None:
+    """Print the table; ``only`` "residual": without the curve."""
     rate, time, discharged = reduced(*measured(Path(path)), float(mass))
     print(f"# last {CHARGE:g} kg of {mass} kg in {Path(path).name}; steady rate {rate:.3f} kg/s")
     print("replicate,observable,x,value")
-    for x, value in zip(time, discharged, strict=True):
+    for x, value in zip(time, discharged, strict=True) if only != "residual" else ():
         print(f"1,discharged_mass_kg,{x:.3f},{value:.4f}")
     print(f"1,residual_mass_kg,,{CHARGE - discharged[-1]:.4f}")
 
