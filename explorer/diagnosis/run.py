@@ -354,6 +354,7 @@ def result_of(
             order.seed,
             _absolute(order.follow_up),
             _absolute(order.given),
+            order.plan_next,
         ),
         given={
             name: tuple(float(value(measurement.scene, path)) for path in effect_values(name, amplitude))

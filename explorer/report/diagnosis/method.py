@@ -207,4 +207,6 @@ def command(result: DiagnosisResult) -> str:
         parts += ["--follow-up", order.follow_up]
     if order.given:
         parts += ["--given", order.given]
+    if not order.plan_next:
+        parts.append("--no-next")
     return shlex.join(parts)

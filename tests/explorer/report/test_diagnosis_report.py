@@ -4,6 +4,8 @@ import copy
 import json
 import math
 import re
+from dataclasses import replace
+from pathlib import Path
 
 import plotly.graph_objects as go
 import pytest
@@ -13,6 +15,7 @@ from doe.diagnose.posterior import TEMPERATURE
 from doe.diagnose.result import Amplitude
 from doe.record import RecordError, VersionError
 from explorer.diagnosis.result import DiagnosisResult
+from explorer.diagnosis.run import DiagnoseOrder, result_of
 from explorer.report import diagnosis as report
 from explorer.report.content import Figure, Folded, Table
 from explorer.report.diagnosis import answer, evidence, wording
@@ -27,7 +30,7 @@ from explorer.report.diagnosis.wording import (
 from explorer.report.folder import write_report
 from solver import ASYMMETRY_NAMES, BULK_NAMES, HISTOGRAM_NAMES, PROFILE_NAMES, TEXTURE_NAMES
 from solver.effects import EFFECTS
-from tests.explorer.diagnosed import CASES, EXPECTED, HOSTILE, NAMES, SEEN_AS, result_of_case, typed
+from tests.explorer.diagnosed import CASES, EXPECTED, HOSTILE, NAMES, SEEN_AS, diagnosed, result_of_case, typed
 from tests.explorer.reported_studies import visible
 
 pytestmark = pytest.mark.usefixtures("unprinted")
@@ -597,3 +600,15 @@ def test_browser_draws_every_chart_and_asks_for_nothing(results, tmp_path, chrom
     assert drawn == len(figures_of(results["effect"]))
     assert [url for url in requests if not url.startswith(("file:", "data:", "blob:"))] == []
     assert errors == []
+
+
+def test_what_was_not_looked_for_is_called_so_and_repeated(results):
+    """An ambiguous answer without what could be measured next."""
+    measurement, found = diagnosed(**CASES["ambiguous"])
+    order = DiagnoseOrder(measurement.folder, Path("results/made up"), plan_next=False)
+    result = result_of(measurement, order, {}, replace(found, suggestions=()), 1.0).to_dict()
+    text = diagnosis_markdown(result)
+    assert "What could tell them apart was not looked for (`--no-next`)." in text
+    assert "No change of the rig that was tried" not in text
+    assert "--no-next\n" in text
+    assert "--no-next" not in diagnosis_markdown(results["ambiguous"])
