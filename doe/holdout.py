@@ -58,14 +58,24 @@ class MeasuredReplicates:
     mean_of: int = 1
 
     @property
+    def alone(self) -> bool:
+        """Whether there is one replicate, which does not tell its scatter."""
+        return len(self.values) == 1
+
+    @property
     def instrument(self) -> FloatArray:
         """The uncertainty that is not in the scatter of the replicates (d,): what is stated, of a single one."""
-        return self.stated if len(self.values) == 1 else np.zeros_like(self.stated)
+        return self.stated if self.alone else np.zeros_like(self.stated)
+
+    @property
+    def deviation(self) -> FloatArray:
+        """Standard deviation of the replicates (d,), or what is stated of a single one."""
+        return self.stated if self.alone else np.asarray(self.values.std(axis=0, ddof=1), dtype=np.float64)
 
     @property
     def share(self) -> float:
         """Variance of a replicate, without that, as a share of the variance that its scatter is taken from."""
-        return 1.0 / self.mean_of if len(self.values) == 1 else 1.0
+        return 1.0 / self.mean_of if self.alone else 1.0
 
 
 @dataclass(frozen=True)
@@ -134,14 +144,14 @@ class _Entry:
     def of(condition: HoldoutCondition, column: int, samples: int, generator: np.random.Generator) -> _Entry:
         data = condition.measured
         measured, before, after = (values[:, column] for values in (data.values, condition.before, condition.after))
-        alone, instrument = len(measured) == 1, float(data.instrument[column])
+        instrument = float(data.instrument[column])
         deviation = math.sqrt(data.share * float(pooled_deviation(measured, after)) ** 2 + instrument**2)
-        noise = deviation**2 if alone else _square_error(measured)
+        noise = deviation**2 if data.alone else _square_error(measured)
         draws = [
             values[generator.integers(0, len(values), size=(samples, len(values)))].mean(axis=1)
             for values in (measured, before, after)
         ]
-        if alone:
+        if data.alone:
             draws[0] = draws[0] + deviation * generator.standard_normal(samples)
         return _Entry(
             observable=data.summaries[column],

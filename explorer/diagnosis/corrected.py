@@ -104,8 +104,7 @@ def _targets(condition: Condition, diagnosis: Diagnosis, scene: Scene) -> list[d
     before = diagnosis.before.blocks[[one.name for one in diagnosis.conditions].index(condition.name)]
     if len(rows) < 1 or len(before) < 2:
         return []
-    alone = len(rows) == 1
-    sd = measured.instrument if alone else rows.std(axis=0, ddof=1)
+    sd = measured.deviation
     missed = np.abs(before.mean(axis=0) - rows.mean(axis=0)) / np.where(sd > 0.0, sd, np.inf)
     allowed = [k for k, name in enumerate(names) if name in observable_names(scene) and sd[k] > 0.0]
     order = sorted(allowed, key=lambda k: (names[k] != "angle_of_repose_deg", -missed[k]))
@@ -113,9 +112,9 @@ def _targets(condition: Condition, diagnosis: Diagnosis, scene: Scene) -> list[d
         {
             "observable": names[k],
             "mean": float(rows[:, k].mean()),
-            **({} if alone else {"n": len(rows)}),
+            **({} if measured.alone else {"n": len(rows)}),
             "sd": float(sd[k]),
-            "sd_source": "stated" if alone else "measured",
+            "sd_source": "stated" if measured.alone else "measured",
             "margin": float(sd[k]),
             "before_mean": float(before[:, k].mean()),
             "before_sd": float(before[:, k].std(ddof=1)),

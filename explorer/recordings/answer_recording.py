@@ -213,12 +213,10 @@ def _numbers(result: DiagnosisResult, condition: Condition) -> str:
     """Every number of ``condition``: measured mean ± SD, or what is stated of a single one, and both models' means."""
     measured = replicates_of(condition)
     rows = measured.values
-    alone = len(rows) == 1
-    deviation = measured.instrument if alone else rows.std(axis=0, ddof=1)
-    data = dict(zip(measured.summaries, zip(rows.mean(axis=0), deviation, strict=True), strict=True))
+    data = dict(zip(measured.summaries, zip(rows.mean(axis=0), measured.deviation, strict=True), strict=True))
     models = result.confirmation.before, result.confirmation.after
     poured = [one for model in models for one in model.conditions if one.condition == condition.name]
-    spread = "stated" if alone else "SD"
+    spread = "stated" if measured.alone else "SD"
     lines = [f"| number (n = {len(rows)}) | measured ± {spread} | before | after |", "|-|-|-|-|"]
     for k, name in enumerate(next(one.summaries for one in result.measured if one.condition == condition.name)):
         mean, sd = (feature_value(result, name, float(one)) for one in data.get(name, (math.nan, math.nan)))
