@@ -4,33 +4,36 @@ import copy
 import json
 import math
 import re
-from dataclasses import replace
-from pathlib import Path
 
 import plotly.graph_objects as go
 import pytest
 from scipy import stats
 
 from doe.diagnose.posterior import TEMPERATURE
-from doe.diagnose.result import Amplitude
 from doe.record import RecordError, VersionError
 from explorer.diagnosis.result import DiagnosisResult
-from explorer.diagnosis.run import DiagnoseOrder, result_of
-from explorer.report import diagnosis as report
-from explorer.report.content import Figure, Folded, Table
-from explorer.report.diagnosis import answer, evidence, wording
+from explorer.report.content import Table
 from explorer.report.diagnosis.answer import VISIBLE
 from explorer.report.diagnosis.charts import MOST_RESIDUALS, bands
 from explorer.report.diagnosis.wording import (
-    SURFACE_LABELS,
     chance,
     feature_label,
     size_text,
 )
-from explorer.report.folder import write_report
-from solver import ASYMMETRY_NAMES, BULK_NAMES, HISTOGRAM_NAMES, PROFILE_NAMES, TEXTURE_NAMES
 from solver.effects import EFFECTS
-from tests.explorer.diagnosed import CASES, EXPECTED, HOSTILE, NAMES, SEEN_AS, diagnosed, result_of_case, typed
+from tests.explorer.diagnosed import CASES, EXPECTED, HOSTILE, NAMES, SEEN_AS, result_of_case, typed
+from tests.explorer.reported_diagnoses import (
+    amplitude_text,
+    as_number,
+    blocks_of,
+    diagnosis_html,
+    diagnosis_markdown,
+    feature_value,
+    figures_of,
+    sections_of,
+    tables,
+    write_diagnosis_report,
+)
 from tests.explorer.reported_studies import visible
 
 pytestmark = pytest.mark.usefixtures("unprinted")
@@ -44,50 +47,6 @@ def results():
 @pytest.fixture(params=CASES)
 def result(request, results):
     return results[request.param]
-
-
-def of_content(make):
-    """``make`` of a result, for the content of its file."""
-    return lambda content, *more: make(typed(content), *more)
-
-
-diagnosis_html, diagnosis_markdown = of_content(report.diagnosis_html), of_content(report.diagnosis_markdown)
-sections_of = of_content(report.sections_of)
-cautions, verdict_sentence = of_content(answer.cautions), of_content(answer.verdict_sentence)
-strained, feature_value = of_content(evidence.strained), of_content(wording.feature_value)
-
-
-def write_diagnosis_report(content, folder):
-    write_report(report.diagnosis_report(typed(content)), folder)
-
-
-def amplitude_text(estimate):
-    return wording.amplitude_text(Amplitude.from_dict(estimate))
-
-
-def blocks_of(result):
-    def walk(blocks):
-        for block in blocks:
-            yield block
-            if isinstance(block, Folded):
-                yield from walk(block.blocks)
-
-    for section in sections_of(result):
-        yield from walk(section.blocks)
-
-
-def figures_of(result):
-    return {block.name: block.spec for block in blocks_of(result) if isinstance(block, Figure)}
-
-
-def tables(result, *start):
-    """Tables whose header begins with ``start``, as they stand in the sections."""
-    found = [block for block in blocks_of(result) if isinstance(block, Table)]
-    return [block.rows for block in found if block.header[: len(start)] == start]
-
-
-def as_number(cell):
-    return float(re.search(r"[-+]?[\d.]+(e-?\d+)?", cell.replace("−", "-"))[0])
 
 
 # Every variant
@@ -307,105 +266,7 @@ def test_the_map_shows_measured_minus_poured(result):
 # One property of one variant
 
 
-def probability(result, name):
-    """Of an effect, as sentences give it."""
-    return f"{100 * next(row['probability'] for row in result['effects'] if row['name'] == name):.1f} %"
-
-
-def test_what_each_verdict_says(results):
-    says = {name: verdict_sentence(result) for name, result in results.items()}
-    assert says["nothing"].startswith("Nothing is missing that these data could show")
-    assert f"with probability {100 * results['nothing']['probabilities']['nothing']:.1f} %" in says["nothing"]
-    assert re.match(
-        r"The declared model lacks `adhesion_sjkr`, with probability (over 99|9\d\.\d) %\. It agrees", says["effect"]
-    )
-    amplitude = r"cohesion energy density [\d.]+ kJ/m³ \(95 % [\d.]+ … [\d.]+ kJ/m³\), \d+ % of the strongest"
-    assert re.search(f"{amplitude} that the literature supports", says["effect"])
-    assert "On data that were not fitted the error falls from" in says["effect"]
-    assert "tilt x" in says["two amplitudes"]
-    assert "tilt y" in says["two amplitudes"]
-    odds = probability(results["not carried over"], "adhesion_sjkr")
-    assert says["not carried over"].startswith(f"The fitted data give `adhesion_sjkr` ({odds}), but the held-out data")
-    assert "discharge t90 of condition holdout is 5.9 standard errors from fresh pours" in says["not carried over"]
-    assert "nothing independent confirms it" in says["no holdout"]
-    assert "lacks two effects at once, `adhesion_sjkr` with `density_error`" in says["pair"]
-    odds = {name: probability(results["ambiguous"], name) for name in ("twisting", "rolling_resistance")}
-    both = f"`twisting` ({odds['twisting']}) and `rolling_resistance` ({odds['rolling_resistance']})"
-    assert says["ambiguous"].startswith(f"The declared model lacks something; these data leave 2 answers: {both}.")
-    assert "6 pours of `half the mass` would single out the right one" in says["ambiguous"]
-    assert says["faint"].startswith("These data leave 4 answers: ")
-    assert "nothing missing (" in says["faint"]
-    assert "`adhesion_sjkr` (" in says["faint"]
-    assert "something outside the library (" in says["faint"]
-    assert "none of the 6 effects explains, with probability over 99 %" in says["unexplained"]
-    assert "of the squared residual is in condition fit" in says["unexplained"]
-    odds = probability(results["does not fit"], "adhesion_sjkr")
-    assert f"`adhesion_sjkr` comes nearest ({odds}), and yet does not fit" in says["does not fit"]
-
-
-def test_a_declared_model_that_does_not_fit_and_has_no_rival_is_called_so(results):
-    result = copy.deepcopy(results["nothing"]) | {"verdict": "unexplained"}
-    assert verdict_sentence(result).startswith("The calibrated declared model does not fit the data, and no effect")
-
-
-def test_an_answer_that_is_taken_back_keeps_its_numbers(results):
-    result = results["not carried over"]
-    text = diagnosis_markdown(result)
-    assert "which the held-out data took back" in text
-    assert result["final"] == "adhesion_sjkr"
-    assert "`adhesion_sjkr`: vary the load on a contact" in text
-    assert "p = 0.0005" in text
-
-
-def test_a_declared_model_that_held_out_data_contradict_is_called_so(results):
-    sentence = verdict_sentence(results["wrong elsewhere"])
-    odds = f"{100 * results['wrong elsewhere']['probabilities']['nothing']:.1f} %"
-    assert sentence.startswith(f"The fitted data give nothing missing ({odds}), but the held-out data contradict it")
-    assert "standard errors from fresh pours of the declared model (p" in sentence
-    assert sentence.endswith("that none of the effects explains in all conditions.")
-
-
-def test_cautions_say_what_the_numbers_cannot(results):
-    texts = {name: visible(diagnosis_html(result)) for name, result in results.items()}
-    assert "it is smaller than on new ones" in texts["no holdout"]
-    for name, text in texts.items():
-        rows = results[name]["error"]["holdout"]
-        assert ("times as far off as noise alone" in text) == bool(rows and rows[-1]["ratio"] > 2.0)
-    assert "even the final model is" in texts["not carried over"]
-    assert "even the final model is" not in texts["effect"]
-    assert "needs static friction grain–steel" in texts["at the edge"]
-    assert "at the upper end of its range" in texts["at the edge"]
-    assert "at the upper end of its range" not in texts["effect"]
-    assert "Only 6 effects were considered" in texts["effect"]
-    for text in texts.values():
-        assert "Fresh pours that broke off or left nothing to be read: 1 of the declared model" in text
-
-
-def test_a_correction_that_held_out_data_do_not_bear_out_is_called_so(results):
-    result = copy.deepcopy(results["effect"])
-    result["error"]["holdout"][-1] |= {"skill": -0.2, "skill_low": -0.9}
-    assert "The held-out data do not confirm it" in verdict_sentence(result)
-    assert any("does not carry over to the held-out conditions" in text for text in cautions(result))
-    assert not any("does not carry over" in text for text in cautions(results["effect"]))
-
-
-def test_an_amplitude_that_is_cut_and_a_wide_scatter_are_called_so(results):
-    result = copy.deepcopy(results["effect"])
-    assert not any("largest amplitude" in text or "times the variance" in text for text in cautions(result))
-    result["effects"][0]["amplitudes"][0]["at_end"] = True
-    result["scatter"] = 2.25
-    assert any("fits best at the largest amplitude that was considered" in text for text in cautions(result))
-    assert any("2.25 times the variance of simulated ones" in text for text in cautions(result))
-    assert "the largest that was considered" in verdict_sentence(result)
-
-
-def test_a_parameter_far_from_its_measurement_is_called_so(results):
-    result = copy.deepcopy(results["effect"])
-    assert strained(result) == []
-    result["parameters"][0] |= {"after": 0.57 + 2.4 * 0.05}
-    (line,) = strained(result)
-    assert "2.4 standard deviations from its measurement" in line
-    assert "the declared model with `adhesion_sjkr` needs static friction grain–grain" in line
+# One property of one variant
 
 
 def test_unseen_effects_are_listed_only_where_nothing_was_found(results):
@@ -460,48 +321,6 @@ def test_of_many_features_the_farthest_are_drawn_and_all_are_listed(results):
     assert f"The {MOST_RESIDUALS} of 85 features that are farthest off." in visible(diagnosis_html(many))
     (rows,) = tables(many, "condition", "feature", "measured")
     assert len(rows) == 85
-
-
-def test_features_read_as_words():
-    words = {
-        "angle_of_repose_deg": "angle of repose",
-        "angle_of_repose_deg@45": "angle of repose seen from 45°",
-        "height_profile_m(0.0125)": "height profile at 0.0125",
-        "bulk_density_kg_m3": "bulk density",
-        "overall": "all together",
-        "ring_height_3_m": "mean height of ring 3",
-        "ring_height_10_m@3 x 0.5 mm": "mean height of ring 10",
-        "ring_volume_m3@1a2b3c4d": "volume of the pile",
-        "height_q90_m": "height that 10 % of the covered area exceeds",
-        "height_share_4": "share of the covered area 1.25 to 1.75 bodies high",
-        "ring_roughness_2_m": "roughness of rings 3 and 4",
-        "curvature_per_m": "mean curvature of the core",
-        "inner_skew_y_m": "centre of volume of the core, y",
-    }
-    assert {name: feature_label(name) for name in words} == words
-
-
-def test_every_feature_of_a_scan_has_words_and_a_unit(results):
-    diagnosis = typed(results["effect"])
-    names = {*PROFILE_NAMES, *BULK_NAMES, *HISTOGRAM_NAMES, *TEXTURE_NAMES, *ASYMMETRY_NAMES}
-    assert SURFACE_LABELS.keys() == names
-    assert len(set(SURFACE_LABELS.values())) == len(names)
-    values = {
-        "ring_height_3_m@3 x 0.5 mm": (0.0141, "14.1 mm"),
-        "ring_volume_m3": (5.1e-5, "51 cm³"),
-        "covered_area_m2": (0.0128, "128 cm²"),
-        "curvature_per_m": (210.0, "0.21 1/mm"),
-        "height_share_4": (0.13, "0.13"),
-        "slope": (0.52, "0.52"),
-        "skew_x_m": (-3e-4, "−0.3 mm"),
-    }
-    for name, (value, text) in values.items():
-        assert wording.feature_value(diagnosis, name, value) == text
-
-
-def test_a_direction_round_the_plane_has_no_rounding_left_in_it():
-    estimate = {"effect": "plate_tilt", "index": 1, "value": -0.27, "low": -0.5, "high": 4.15e-17, "at_end": False}
-    assert amplitude_text(estimate) == "−0.27° (95 % −0.5 … 0°)"
 
 
 def test_hostile_names_stay_text(results):
@@ -600,15 +419,3 @@ def test_browser_draws_every_chart_and_asks_for_nothing(results, tmp_path, chrom
     assert drawn == len(figures_of(results["effect"]))
     assert [url for url in requests if not url.startswith(("file:", "data:", "blob:"))] == []
     assert errors == []
-
-
-def test_what_was_not_looked_for_is_called_so_and_repeated(results):
-    """An ambiguous answer without what could be measured next."""
-    measurement, found = diagnosed(**CASES["ambiguous"])
-    order = DiagnoseOrder(measurement.folder, Path("results/made up"), plan_next=False)
-    result = result_of(measurement, order, {}, replace(found, suggestions=()), 1.0).to_dict()
-    text = diagnosis_markdown(result)
-    assert "What could tell them apart was not looked for (`--no-next`)." in text
-    assert "No change of the rig that was tried" not in text
-    assert "--no-next\n" in text
-    assert "--no-next" not in diagnosis_markdown(results["ambiguous"])
