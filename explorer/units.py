@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from solver import load_material, parameters
+from solver import RIGS, load_material, parameters, with_rig
 from solver.observables import OBSERVABLES
 from solver.params import UNITS, Parameter
 
@@ -15,7 +15,7 @@ READ_IN = {"Pa": "MPa", "m": "mm", "kg": "g", "kg/s": "g/s", "J/m3": "kJ/m3", "J
 """SI unit → the unit that is read instead of it, as files spell it; all others are read as they are."""
 ENTERED_IN_SI = ("J/m3", "J/m2", "N/m")
 """Of these the page and the command line show and take SI: amplitudes of effects, which start at 0."""
-SYMBOLS = {"deg": "°", "kg/m3": "kg/m³", "m/s2": "m/s²", "kJ/m3": "kJ/m³", "mJ/m2": "mJ/m²", "1": ""}
+SYMBOLS = {"deg": "°", "kg/m3": "kg/m³", "m/s2": "m/s²", "kJ/m3": "kJ/m³", "mJ/m2": "mJ/m²", "m3": "m³", "1": ""}
 """Unit as files spell it → its symbol in a report, where that is another."""
 MISSING = "–"
 """What stands for a number that could not be computed."""
@@ -111,9 +111,10 @@ def _own(path: str) -> tuple[str, str]:
 
 @cache
 def parameter_units() -> dict[str, str]:
-    """Last part of a parameter's path → its SI unit, as the solver declares it."""
-    declared = parameters(load_material("sunflower_extract"))
-    return {path.rsplit(".", 1)[-1]: parameter.unit for path, parameter in declared.items()}
+    """Last part of a parameter's path → its SI unit, as the solver declares it in any rig."""
+    scene = load_material("sunflower_extract")
+    declared = [one for name in RIGS for one in parameters(with_rig(scene, name)).values()]
+    return {parameter.path.rsplit(".", 1)[-1]: parameter.unit for parameter in declared}
 
 
 def unit_of_parameter(path: str) -> ReadingUnit:

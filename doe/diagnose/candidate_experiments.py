@@ -29,7 +29,7 @@ from doe.measurement.condition_table import turned as turned_scene
 from doe.measurement.features import feature_set, offer_of
 from doe.measurement.measurement import Condition
 from doe.record import Record
-from solver import EFFECTS, ParameterError, Scene, parameters, value, with_values
+from solver import EFFECTS, ParameterError, Scene, parameters, pour_rig, value, with_values
 
 FloatArray = npt.NDArray[np.float64]
 PoursIn = Callable[[Sequence[Condition]], ModelPours]
@@ -69,16 +69,12 @@ CHANGES = (
     Change("as it is, poured again"),
     Change("half the mass", {"rig.mass": 0.5}),
     Change("half as much mass again", {"rig.mass": 1.5}),
-    Change("outlet at 0.6 times the height", {"rig.outlet_height": 0.6}),
-    Change("outlet at 1.5 times the height", {"rig.outlet_height": 1.5}),
-    Change("outlet at twice the height", {"rig.outlet_height": 2.0}),
-    Change("outlet 1.3 times as wide", {"rig.outlet_diameter": 1.3}),
     Change("fed four times as fast", {"insertion.rate": 4.0}),
     Change("fed at 0.4 times the rate", {"insertion.rate": 0.4}),
     Change("dropped four times as fast", {"insertion.drop_speed": 4.0}),
     Change("filled with the outlet closed, then opened", choices={"insertion.protocol": "fill_then_open"}),
-    Change("outlet 1.3 times as wide at twice the height", {"rig.outlet_diameter": 1.3, "rig.outlet_height": 2.0}),
 )
+"""Of any rig; each has its own beside them (``PourRig.quick_changes``)."""
 
 
 @dataclass(frozen=True)
@@ -226,7 +222,7 @@ def feasible(scene: Scene, calibrated: Collection[str] = ()) -> list[tuple[Chang
     """
     found = []
     known = set(parameters(scene)) - set(calibrated)
-    for change in CHANGES:
+    for change in (*CHANGES, *(Change(*own) for own in pour_rig(scene).quick_changes.items())):
         if "insertion.protocol" in change.choices and scene.numerics.duration > 0.0:
             continue  # filled first, it would be read before it has run out
         if not set(change.factors) | set(change.choices) <= known:

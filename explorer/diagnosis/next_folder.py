@@ -474,6 +474,9 @@ def setup_svg(scene: Scene, changed: Mapping[str, float | str]) -> str:
     if "rig.mass" in known:
         mass = parameter_value("rig.mass", float(value(scene, "rig.mass")))
         drawn.append(text(0.0, 0.0, EDGE, f"poured: {mass}", "rig.mass"))
+    if (lift := "rig.lift_speed") in known:
+        words = f"lifted at {parameter_value(lift, float(value(scene, lift)))}"
+        drawn.append(text(side + 10.0 / scale, 0.0, 20.0, words, lift, anchor="start"))
     drawn.append(text(0.0, 0.0, 1.6 * EDGE, PROTOCOLS[fed.protocol], "insertion.protocol"))
     if changed:
         drawn.append(text(0.0, 0.0, 2.3 * EDGE, "in this colour: what is set otherwise", next(iter(changed))))

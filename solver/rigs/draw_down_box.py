@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 from solver.params import ParameterError, param
 from solver.rigs.feed import BoxFeed
@@ -52,6 +53,10 @@ class DrawDownBox(PourRig):
         DISCHARGE,
     )
     keeps_material = True
+    quick_changes: ClassVar[Mapping[str, Mapping[str, float]]] = {
+        "slot 1.3 times as wide": {"rig.slot_width": 1.3},
+        "shelf at 1.5 times the height": {"rig.shelf_height": 1.5},
+    }
 
     @property
     def suits(self) -> Mapping[str, float | str]:

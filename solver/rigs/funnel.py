@@ -13,7 +13,9 @@ Source of the shipped dimensions: Processes 2022, 10, 185, §2.6 (funnel); the o
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 from solver.params import ParameterError, param
 from solver.rigs.feed import RoundFeed
@@ -42,6 +44,13 @@ class Funnel(PourRig):
     quarter_turns = True
     protocols = ("pour_through", "fill_then_open")
     refills = True
+    quick_changes: ClassVar[Mapping[str, Mapping[str, float]]] = {
+        "outlet at 0.6 times the height": {"rig.outlet_height": 0.6},
+        "outlet at 1.5 times the height": {"rig.outlet_height": 1.5},
+        "outlet at twice the height": {"rig.outlet_height": 2.0},
+        "outlet 1.3 times as wide": {"rig.outlet_diameter": 1.3},
+        "outlet 1.3 times as wide at twice the height": {"rig.outlet_diameter": 1.3, "rig.outlet_height": 2.0},
+    }
 
     @property
     def inlet_height(self) -> float:

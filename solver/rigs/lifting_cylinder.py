@@ -42,6 +42,10 @@ class LiftingCylinder(PourRig):
     surface_names: ClassVar[tuple[str, ...]] = ("plate", "cylinder")
     gives = (PILE, DISCHARGE)
     quarter_turns = True
+    quick_changes: ClassVar[Mapping[str, Mapping[str, float]]] = {
+        "lifted three times as fast": {"rig.lift_speed": 3.0},
+        "lifted at half the speed": {"rig.lift_speed": 0.5},
+    }
 
     @property
     def suits(self) -> Mapping[str, float | str]:

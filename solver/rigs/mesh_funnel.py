@@ -7,10 +7,11 @@ axis within a cut (:class:`Opening`); the gate that keeps the outlet shut is a d
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -55,6 +56,11 @@ class MeshFunnel(PourRig):
     gives = (PILE, DISCHARGE)
     protocols = ("pour_through", "fill_then_open")
     refills = True
+    quick_changes: ClassVar[Mapping[str, Mapping[str, float]]] = {
+        "outlet at 0.6 times the height": {"rig.outlet_height": 0.6},
+        "outlet at 1.5 times the height": {"rig.outlet_height": 1.5},
+        "outlet at twice the height": {"rig.outlet_height": 2.0},
+    }
 
     @property
     def mesh_file(self) -> Path:

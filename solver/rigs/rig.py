@@ -200,6 +200,14 @@ class PourRig(Rig, Protocol):
         """When and where the free surface is kept; None: never."""
         return None
 
+    @property
+    def quick_changes(self) -> Mapping[str, Mapping[str, float]]:
+        """What a laboratory can change of it within minutes: name → parameter path → factor.
+
+        A diagnosis that cannot tell two answers apart looks among these for the experiment that would.
+        """
+        return {}
+
     def poured_mass(self, density: float) -> float:
         """Mass to be poured [kg] of bodies whose solid has ``density`` [kg/m³]."""
         ...

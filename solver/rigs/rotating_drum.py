@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 from solver.params import ParameterError, param
 from solver.rigs.feed import BoxFeed
@@ -52,6 +53,12 @@ class RotatingDrum(PourRig):
     name = "rotating_drum"
     surface_names = ("shell", "front", "back")
     gives = (FREE_SURFACE,)
+    quick_changes: ClassVar[Mapping[str, Mapping[str, float]]] = {
+        "turned twice as fast": {"rig.speed_rpm": 2.0},
+        "turned at half the speed": {"rig.speed_rpm": 0.5},
+        "bed 1.3 times as large": {"rig.filled_volume": 1.3},
+        "bed 0.7 times as large": {"rig.filled_volume": 0.7},
+    }
 
     @property
     def suits(self) -> Mapping[str, float | str]:

@@ -54,6 +54,10 @@ def test_units_are_those_that_people_read():
     assert parameter_value("material.seed.shear_modulus", 56.3e6) == "56.3 MPa"
     assert parameter_range("rig.outlet_height", 0.06, 0.08) == "60 … 80 mm"
     assert parameter_value("insertion.rate", 0.02) == "20 g/s"
+    assert parameter_value("rig.slot_width", 0.09) == "90 mm"
+    assert parameter_value("rig.lift_speed", 0.02) == "0.02 m/s"
+    assert parameter_value("rig.speed_rpm", 15.0) == "15 rpm"
+    assert parameter_value("rig.filled_volume", 8e-4) == "0.0008 m³"
     assert parameter_value("body.spheres", "coarse") == "coarse"
     assert parameter_label("pair.seed.rigid_sieve_plate.static_friction") == "static friction seed–rigid sieve plate"
 

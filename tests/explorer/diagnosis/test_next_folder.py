@@ -17,21 +17,26 @@ from doe.errors import MeasurementError
 from doe.measurement.load import load_measurement
 from explorer.diagnosis.next_folder import CHANGED, asks_for, read_next, setup_svg, write_next
 from explorer.errors import CommandError
-from solver import pour_rig, with_rig, with_values
+from solver import RIGS, pour_rig, with_rig, with_values
 from solver.assets import measurement_folder
+from solver.rigs import Funnel
 from tests.doe.measurement import folders
 
 SOURCE = measurement_folder("trefoil_2")
 RIVALS = ("rolling_resistance", "rolling_resistance+twisting", "base")
 TWICE = "outlet at twice the height"
 SHUT = "filled with the outlet closed, then opened"
-TIMED = [change for change in CHANGES if change.name != SHUT]
-"""Changes of a set-up that is read after a stated time: one that is filled first would be read while it runs out."""
 
 
 @pytest.fixture(scope="module")
 def measured():
     return load_measurement(SOURCE)
+
+
+@pytest.fixture(params=[name for name in (*(one.name for one in CHANGES), *Funnel.quick_changes) if name != SHUT])
+def timed(request):
+    """A change of a set-up that is read after a stated time: filled first, it would be read while it runs out."""
+    return request.param
 
 
 def suggestion(name, values, condition="fit", pours=3):
@@ -61,12 +66,11 @@ def fill(folder):
     return folder
 
 
-@pytest.mark.parametrize("change", TIMED, ids=lambda change: change.name)
-def test_a_filled_folder_is_the_changed_set_up(tmp_path, measured, change):
+def test_a_filled_folder_is_the_changed_set_up(tmp_path, measured, timed):
     fit = measured.fit[0]
-    values = values_of(measured, change.name)
-    found = read_next(fill(written(tmp_path / "out/next", SOURCE, measured, change.name)))
-    assert (found.rivals, found.change) == (RIVALS, change.name)
+    values = values_of(measured, timed)
+    found = read_next(fill(written(tmp_path / "out/next", SOURCE, measured, timed)))
+    assert (found.rivals, found.change) == (RIVALS, timed)
     (condition,) = found.measurement.conditions
     assert replace(condition.scene, title="") == replace(with_values(fit.scene, dict(values)), title="")
     assert (condition.role, condition.replicates, condition.mean_of) == ("fit", 3, 1)
@@ -77,10 +81,9 @@ def test_a_filled_folder_is_the_changed_set_up(tmp_path, measured, change):
     assert condition.name not in {one.name for one in measured.conditions}
 
 
-@pytest.mark.parametrize("change", TIMED, ids=lambda change: change.name)
-def test_the_drawing_shows_what_changes(tmp_path, measured, change):
-    values = values_of(measured, change.name)
-    folder = written(tmp_path / "next", SOURCE, measured, change.name)
+def test_the_drawing_shows_what_changes(tmp_path, measured, timed):
+    values = values_of(measured, timed)
+    folder = written(tmp_path / "next", SOURCE, measured, timed)
     drawing = (folder / "setup.svg").read_text()
     assert ElementTree.fromstring(drawing).tag == "{http://www.w3.org/2000/svg}svg"
     assert (CHANGED in drawing) == bool(values)
@@ -115,6 +118,12 @@ def test_what_is_read_after_a_stated_time_is_not_filled_first(measured):
     scene = measured.fit[0].scene
     assert SHUT not in {change.name for change, _ in feasible(scene)}
     assert SHUT in {change.name for change, _ in feasible(with_values(scene, {"numerics.duration": 0.0}))}
+
+
+def test_a_rig_s_own_changes_are_on_the_menu(measured):
+    for name in RIGS:
+        scene = with_rig(measured.scene, name)
+        assert set(pour_rig(scene).quick_changes) <= {change.name for change, _ in feasible(scene)}
 
 
 def test_what_is_calibrated_is_changed_by_no_candidate(measured):
@@ -326,6 +335,7 @@ def test_rigs_that_are_drawn(measured):
     words = " ".join(cylinder.itertext())
     assert "cylinder height 150 mm" in words
     assert "diameter 80 mm" in words
+    assert "lifted at 0.02 m/s" in words
     for name in ("rotating_drum", "mesh_funnel"):
         assert setup_svg(with_rig(scene, name), {}) == ""
 

@@ -11,7 +11,7 @@ from solver.rigs import BENCH_RIGS, RIGS
 from solver.rigs.feed import RoundFeed
 from solver.rigs.rig import Move, Switch
 from solver.scenes.material_file import with_set_up, with_settings
-from solver.scenes.scene import body_counts, parameters, pour_rig, poured_mass, with_rig, with_values
+from solver.scenes.scene import body_counts, parameters, pour_rig, poured_mass, value, with_rig, with_values
 from tests.explorer.beads import bead_scene
 
 ALL = {**RIGS, **BENCH_RIGS}
@@ -43,6 +43,15 @@ def test_a_rig_says_what_it_does_and_what_is_read(name):
     gates = [action for action in actions if isinstance(action, Switch) and not action.active]
     assert {rig.surface_names[action.surface] for action in gates} <= {"gate"}
     assert gates or any(isinstance(action, Move) for action in actions)
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_what_a_laboratory_can_change_makes_another_rig_that_passes_its_checks(name):
+    scene = with_settings(bead_scene(), {"rig.name": name})
+    for factors in pour_rig(scene).quick_changes.values():
+        changed = {path: factor * float(value(scene, path)) for path, factor in factors.items()}
+        assert all(path.startswith("rig.") for path in factors)
+        assert with_values(scene, changed).rig != scene.rig
 
 
 @pytest.mark.parametrize("name", RIGS)
