@@ -119,13 +119,19 @@ class BeforeAndAfter(Record):
 
 @dataclass(frozen=True)
 class MeasuredCondition(Record):
-    """A condition of the data. ``replicates``: measured pours."""
+    """A condition of the data. ``replicates``: measured pours; ``mean_of``: how many of them one row is the mean of."""
 
     condition: str
     role: Role
     rig: str
     replicates: int
     summaries: tuple[str, ...]
+    mean_of: int = 1
+
+    @property
+    def alone(self) -> bool:
+        """Whether its scatter cannot be told from the data: a single pour, or a single mean of several."""
+        return self.replicates == self.mean_of
 
 
 @dataclass(frozen=True)

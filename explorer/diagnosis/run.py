@@ -341,6 +341,7 @@ def result_of(
                 condition.scene.rig.name,
                 condition.replicates * condition.mean_of,
                 tuple(s.name for s in summaries(condition)),
+                condition.mean_of,
             )
             for condition in found.conditions
         ),

@@ -61,8 +61,8 @@ ERROR_CAPTION = (
     "in the model's 90 % predictive interval."
 )
 ALONE = (
-    " A condition measured once does not tell its scatter: its error is the stated uncertainty and the scatter of "
-    "fresh pours, and its standard deviation of a pour is of both."
+    " A condition with a single value, of one pour or the mean of several, does not tell its scatter: its error is the "
+    "stated uncertainty and the scatter of fresh pours, and its standard deviation of a pour is of both."
 )
 
 
@@ -102,7 +102,7 @@ def error(result: DiagnosisResult) -> Section:
 
 
 def _error_table(result: DiagnosisResult, role: Role, caption: str) -> Table:
-    if any(row.replicates == 1 for row in result.measured if row.role == role):
+    if any(row.alone for row in result.measured if row.role == role):
         caption += ALONE
     return Table(ERROR_HEADER, tuple(_error_row(result, row) for row in result.error.of(role)), caption)
 

@@ -61,8 +61,8 @@ def data(result: DiagnosisResult) -> Section:
         if scatter <= 1.0
         else f"with {fixed(scatter)} times the variance of simulated ones, and the noise of the data is widened by that"
     )
-    if all(row.replicates == 1 for row in result.measured if row.role == "fit"):
-        blocks.append(Text("No condition was measured twice: pours are taken to scatter as simulated ones do."))
+    if all(row.alone for row in result.measured if row.role == "fit"):
+        blocks.append(Text("No condition has two values: pours are taken to scatter as simulated ones do."))
     else:
         blocks.append(Text(f"Measured pours of a condition scatter {words}."))
     return Section("Data", tuple(blocks))

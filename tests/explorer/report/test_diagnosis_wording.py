@@ -115,6 +115,18 @@ def test_a_correction_that_held_out_data_do_not_bear_out_is_called_so(results):
     assert not any("does not carry over" in text for text in cautions(results["effect"]))
 
 
+def test_a_single_value_is_said_to_tell_no_scatter(results):
+    single, means = copy.deepcopy(results["measured once"]), copy.deepcopy(results["effect"])
+    for row in single["measured"]:
+        row |= {"replicates": 10, "mean_of": 10}
+    for row in means["measured"]:
+        row |= {"replicates": 30, "mean_of": 10}
+    for result, told in ((single, False), (results["measured once"], False), (means, True), (results["effect"], True)):
+        page = visible(diagnosis_html(result))
+        assert ("does not tell its scatter" not in page) == told
+        assert ("No condition has two values" not in page) == told
+
+
 def test_an_amplitude_that_is_cut_and_a_wide_scatter_are_called_so(results):
     result = copy.deepcopy(results["effect"])
     assert not any("largest amplitude" in text or "times the variance" in text for text in cautions(result))
