@@ -17,9 +17,13 @@ function send(command) {
   else unsent?.push(text);
 }
 
+const tabs = () => [...document.querySelectorAll("#root [role=tab]")];
+const tabOf = room => tabs().find(one => one.textContent.trim() === room);
+const isOpen = tab => tab.getAttribute("aria-selected") === "true";
+
 // A tab by its name: in a panel that is open, folded to the edge of the window, or in a small window's bottom sheet.
 function openRoom(name) {
-  const tab = () => [...document.querySelectorAll("#root [role=tab]")].find(one => one.textContent.trim() === name);
+  const tab = () => tabOf(name);
   const sheet = () => [...document.querySelectorAll("#root [role=button]")].find(
     one => (one.getAttribute("aria-label") || "").startsWith("Expand panel") && one.textContent.includes(name));
   const open = one => {
@@ -218,6 +222,19 @@ function connect() {
 }
 connect();
 if (!localStorage.getItem("explorer-begun")) beginning.showModal();
+
+// The rooms that are open when a page is left are opened when it is loaded again, in this window.
+const ROOMS = "explorer-rooms";
+window.addEventListener("pagehide", () => {
+  sessionStorage.setItem(ROOMS, JSON.stringify(tabs().filter(isOpen).map(one => one.textContent.trim())));
+});
+for (const room of JSON.parse(sessionStorage.getItem(ROOMS) || "[]")) {
+  soon(() => tabOf(room), tab => {
+    if (isOpen(tab)) return;
+    press(tab);
+    tab.blur();
+  });
+}
 
 // For the boards in the study panel, which are pages of this server and of the same origin.
 window.explorer = { send, openRoom };
