@@ -199,6 +199,8 @@ class Answers:
             last.row,
             first=first.row.verdict,
             follow_up=first.suggestion.experiment.name,
+            asked=first.suggestion.pours,
+            chance=first.suggestion.experiment.chance,
             pours=first.row.pours + last.row.pours,
         )
 

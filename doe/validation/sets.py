@@ -71,6 +71,8 @@ class SetRow(Record):
         The answer, after the follow-up where one was asked for.
     first, follow_up
         The answer before, and the change of the set-up that was asked for; "" without one.
+    asked, chance
+        Pours that were asked for there, 0 without one, and the chance of an answer that they were said to have.
     nothing, outside, best, best_p, truth_p
         Probabilities; ``best``: the most probable effect, ``truth_p``: of the truth, NaN where it is no library effect.
     evidence
@@ -102,6 +104,8 @@ class SetRow(Record):
     verdict: str
     first: str = ""
     follow_up: str = ""
+    asked: int = 0
+    chance: float = math.nan
     nothing: float = math.nan
     outside: float = math.nan
     best: str = ""

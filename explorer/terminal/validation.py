@@ -9,6 +9,8 @@ from explorer.terminal.text_table import text_table
 from solver import PHYSICS
 
 ANSWERS: tuple[Answer, ...] = ("nothing", "right", "undecided", "unexplained", "wrong")
+TRUE: dict[str, Answer] = {"null": "nothing", "outside": "unexplained"}
+"""The answer that is true of sets without a library effect."""
 
 
 def campaign_text(rows: Sequence[SetRow]) -> str:
@@ -64,7 +66,7 @@ def effects_text(rows: Sequence[SetRow]) -> str:
 
 
 def followed_text(rows: Sequence[SetRow]) -> str:
-    """Right names before and after the follow-up, and which changes were asked for."""
+    """Right names before and after the follow-up, which changes were asked for, and what they were said to decide."""
     asked = Counter(row.follow_up for row in rows if row.follow_up)
     library = [row for row in rows if row.kind in ("effect", "pair")]
     before, after = (
@@ -73,7 +75,13 @@ def followed_text(rows: Sequence[SetRow]) -> str:
     )
     lines = [f"right names of library effects: {before} before the follow-up, {after} after it"]
     lines += [f"followed up: {sum(asked.values())} of {len(rows)} sets"] if asked else []
-    return "\n".join([*lines, *(f"  {number:4}  {change}" for change, number in asked.most_common())])
+    lines += [f"  {number:4}  {change}" for change, number in asked.most_common()]
+    for pours in sorted({row.asked for row in rows if row.asked}):
+        own = [row for row in rows if row.asked == pours]
+        right = Rate(sum(row.answer == TRUE.get(row.kind, "right") for row in own), len(own))
+        chance = sum(row.chance for row in own) / len(own)
+        lines.append(f"answered by {pours} more pours, stated chance {chance:.0%}: {right}")
+    return "\n".join(lines)
 
 
 def scores_text(found: Scores) -> str:

@@ -107,6 +107,24 @@ def test_rows_come_back_as_they_were_written(tmp_path):
         assert json.loads(line)["root"] == 5
 
 
+def test_follow_ups_are_held_against_the_chance_that_they_were_said_to_have():
+    rows = [
+        replace(row(k, kind, label, verdict), first="ambiguous:a,b", follow_up="half the mass", asked=asked, chance=0.8)
+        for k, (kind, label, verdict, asked) in enumerate(
+            [
+                ("effect", "a", "effect:a", 6),
+                ("effect", "a", "no_missing_effect", 6),
+                ("null", "none", "no_missing_effect", 6),
+                ("outside", "x", "unexplained", 24),
+                ("pair", "a+b", "ambiguous:a+b,b", 24),
+            ]
+        )
+    ]
+    text = campaign_text([*rows, row(9, "null", "none", "no_missing_effect")])
+    assert "answered by 6 more pours, stated chance 80%: 2/3 = 66.7 %" in text
+    assert "answered by 24 more pours, stated chance 80%: 1/2 = 50.0 %" in text
+
+
 def test_a_line_that_was_cut_off_is_passed_over_and_its_set_can_be_judged_again(tmp_path):
     path, rows = tmp_path / "sets.jsonl", [row(k, "null", "none", "no_missing_effect") for k in (1, 2)]
     append_rows(path, rows)
