@@ -20,7 +20,7 @@ from doe.declared.points import AS_IT_IS
 from doe.declared.pours import ModelPours
 from doe.diagnose.compared_features import usable
 from doe.diagnose.emulator import Emulator, Lessons, emulated, planar_weights
-from doe.diagnose.next_experiment import CandidateExperiment, Prediction, rank_experiments
+from doe.diagnose.next_experiment import CandidateExperiment, Prediction, fewest_pours
 from doe.diagnose.posterior import Posterior
 from doe.diagnose.result import Suggestion
 from doe.diagnose.training_pours import TrainingPours, acting
@@ -36,10 +36,6 @@ PoursIn = Callable[[Sequence[Condition]], ModelPours]
 
 BASE_POURS, POURS = 12, 4
 """Pours of the base model, and of every direction of an effect that is left, in each set-up of the candidates."""
-PLANNED = (6, 12, 24)
-"""Pours that may be asked of the laboratory."""
-LIKELY = 0.8
-"""Chance of an answer from which on the fewer pours will do."""
 INTERVAL = 2.0 * 1.96
 """Standard deviations in a 95 % interval."""
 
@@ -124,10 +120,7 @@ def next_experiment(
         return CandidateExperiments((), model.run_now)
     asked = dict.fromkeys(name for label in weights if label != "base" for name in label.split("+"))
     levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in asked)
-    for planned in PLANNED:
-        ranked = rank_experiments(items, weights, planned)
-        if ranked[0].chance >= LIKELY:
-            break
+    planned, ranked = fewest_pours(items, weights)
     suggestions = [
         Suggestion(one, changes[one.name], condition.name, tuple(weights), levers, planned, turned) for one in ranked
     ]
@@ -143,10 +136,7 @@ def _item(
     c: int,
     set_up: Condition,
 ) -> CandidateExperiment:
-    """What every answer predicts in a set-up, whitened by a regression of its own.
-
-    Raises StatisticsError where an answer has too few pours that ended.
-    """
+    """What every answer predicts in a set-up, by a regression of its own; StatisticsError if too few pours ended."""
     offered = feature_set(set_up).offered(offer_of(set_up))
     taught, (columns,) = usable(lessons, [np.arange(offered)])
     used = sorted(set(taught.way[taught.way >= 0].tolist()))

@@ -12,6 +12,7 @@ from doe.diagnose.next_experiment import (
     CandidateExperiment,
     Prediction,
     chance_of_an_answer,
+    fewest_pours,
     rank_experiments,
 )
 from doe.diagnose.posterior import TEMPERATURE
@@ -51,6 +52,19 @@ def test_the_candidates_are_ranked_and_set_ups_that_say_nothing_come_last():
     assert [row.name for row in found] == ["apart", "near", "vague", "same"]
     assert found[0].separation == pytest.approx(3.0)
     assert found[-1].chance == 0.0
+
+
+@pytest.mark.parametrize(
+    ("gap", "own", "pours"),
+    [
+        (4.0, 0.0, 6),  # six tell them apart; below, chances of 6, 12 and 24 pours by the formula above
+        (1.5, 0.0, 12),  # 0.83, 0.98, 1.00
+        (1.0, 0.0, 24),  # 0.48, 0.80, 0.97
+        (3.0, 9.0, 6),  # what is not known of either answer keeps them together
+    ],
+)
+def test_the_fewest_pours_that_do_nearly_as_well_are_asked_for(gap, own, pours):
+    assert fewest_pours([item(gap, own), item(0.0, name="same")], WEIGHTS)[0] == pours
 
 
 def test_bad_candidates_are_refused():
