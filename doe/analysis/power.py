@@ -261,10 +261,11 @@ def smallest_linear_effect(
     """Return the change from low to high of one factor, 2 b_i, that a second-order model of `design` resolves.
 
     design: coded points, shape (points, factors), each run `replicates` times. SE = 2 sigma sqrt(v/replicates)
-    with v the entry of (X'X)^-1 that belongs to a linear term; the error is the residual of the model.
+    with v the largest entry of (X'X)^-1 that belongs to a linear term, for not every design tells all factors alike;
+    the error is the residual of the model.
     """
     model = second_order_terms(design)
-    variance = float(np.linalg.inv(model.T @ model)[1, 1])
+    variance = float(np.diag(np.linalg.inv(model.T @ model))[1 : 1 + design.shape[1]].max())
     df = model.shape[0] * replicates - model.shape[1]
     return smallest_effect(2 * sigma * math.sqrt(variance / replicates), df, alpha, power)
 

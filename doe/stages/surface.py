@@ -38,7 +38,7 @@ class SurfaceResult(Record):
     anova: tuple[SurfaceAnova, ...]
     canonical: tuple[Canonical, ...]
     smallest_main_effect: tuple[float, ...]
-    """Per target: the change from low to high of one factor that would have been seen with power 0.8."""
+    """Per target: the change from low to high of any one factor that would have been seen with power 0.8."""
 
     @property
     def line(self) -> str:
@@ -140,8 +140,9 @@ def surface(
 
 
 def _smallest_main_effect(model: Surface) -> float:
-    linear = 1  # terms stand in the order 1, x₁, x₂, …; the design gives every linear term the same variance
-    error = 2.0 * math.sqrt(model.mse * model.information_inverse[linear, linear])
+    # Terms stand in the order 1, x₁, x₂, …; missing runs, and some designs, tell one factor worse than another.
+    worst = float(np.diag(model.information_inverse)[1 : 1 + len(model.names)].max())
+    error = 2.0 * math.sqrt(model.mse * worst)
     return smallest_effect(error, model.df_residual)
 
 

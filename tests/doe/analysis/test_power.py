@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -25,6 +26,13 @@ def test_power_agrees_with_statsmodels(n, effect):
 def test_replicates_agree_with_statsmodels(effect):
     exact = TTestIndPower().solve_power(effect, power=0.8, alpha=0.05)
     assert power.replicates_for_difference(effect, 1.0) == math.ceil(exact)
+
+
+@pytest.mark.parametrize("n", [2, 3, 12])
+def test_the_smallest_difference_agrees_with_statsmodels(n):
+    # Both search for a root; the looser of them stops at 1e-6 or so.
+    exact = TTestIndPower().solve_power(nobs1=n, power=0.8, alpha=0.05)
+    assert power.smallest_difference(1.7, n) == pytest.approx(1.7 * exact, rel=1e-5)
 
 
 @pytest.mark.parametrize("replicates, chance", [(2, 0.95), (3, 0.995)])
@@ -55,6 +63,17 @@ def test_error_of_a_linear_term_in_the_box_behnken_design():
     """8 of its 12 edge points hold a factor at ±1, so Var(b) = σ²/(8 n) and SE(2 b) = 2 σ/√(8 n)."""
     error, df = 2 * 1.5 / math.sqrt(8 * 3), 17 * 3 - 10
     assert power.smallest_linear_effect(1.5, 3, BOX_BEHNKEN) == pytest.approx(power.smallest_effect(error, df))
+
+
+@pytest.mark.parametrize("order", [[0, 1], [1, 0]])
+def test_of_a_design_that_tells_factors_unlike_the_worst_one_counts(order):
+    """3² points of which B moves by half: Var(b_B) = σ²/(6 n/4), and four times the information on A."""
+    levels = (-1.0, 0.0, 1.0)
+    design = np.array([(a, b / 2) for a in levels for b in levels])[:, order]
+    error = 2 * 1.5 / math.sqrt(6 * 3 / 4)
+    assert power.smallest_linear_effect(1.5, 3, design) == pytest.approx(power.smallest_effect(error, 9 * 3 - 6))
+    # σ² times 1/4 and 1 of the information of as many rows at ±1; here Σ x² is 6 and 6/4 of 9.
+    assert power.main_effect_efficiency(design) == pytest.approx(6 / 4 / 9)
 
 
 @pytest.mark.parametrize("effect", [0.4, 1.0, 3.0])
