@@ -26,6 +26,7 @@ from doe.analysis.steepest_ascent import (
     joint_path,
     region_around,
 )
+from doe.analysis.verification import relative_error_percent
 from doe.record import Record
 from doe.run_records import FloatArray, Run, Runner, Setting, responses
 from doe.stages.screening import ScreeningResult
@@ -196,7 +197,7 @@ def _walk(table: FloatArray, predicted: FloatArray, target: Target, noise: Noise
         means=means,
         sd=np.array([row[~np.isnan(row)].std(ddof=1) if k > 1 else math.nan for row, k in zip(table, n, strict=True)]),
         standard_error=noise.sigma / np.sqrt(np.maximum(n, 1)),
-        relative_error_percent=100 * np.abs(means - target.mean) / abs(target.mean),
+        relative_error_percent=np.array([relative_error_percent(float(mean), target.mean) for mean in means]),
         smallest_difference=smallest_effect(noise.sigma * math.sqrt(2.0 / profile.ascent_replicates), noise.runs - 1),
     )
 

@@ -1,0 +1,80 @@
+"""What stages say that they could have seen, and how well a step of a walk is known: by hand and by SciPy."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from doe.analysis.pilot import Noise
+from doe.analysis.steepest_ascent import Region
+from doe.analysis.surface import fit_surface
+from doe.analysis.verification import verify
+from doe.stages.ascent import _approach, _walk
+from doe.stages.surface import _smallest_main_effect
+from doe.stages.verification import _smallest_difference
+from doe.studies.profile import Profile
+from doe.target import Target
+
+NOISE = Noise(mean=20.0, sigma=1.5, low=1.0, high=2.5, runs=9)
+PROFILE = Profile("test", ascent_replicates=4)
+TARGET = Target("angle_of_repose_deg", 25.0, 1.2, 9)
+
+
+def seen(effect, error, df):
+    """Chance that a two-sided t test at 5 % sees an effect; the far tail is negligible."""
+    return stats.nct.sf(stats.t.isf(0.025, df), df, effect / error)
+
+
+def walk(*steps, target=TARGET):
+    return _walk(np.array(steps, dtype=float), np.zeros(len(steps)), target, NOISE, PROFILE)
+
+
+def test_a_step_is_known_by_the_pilot_s_scatter_of_its_valid_pours():
+    found = walk([20.0, 22.0, 24.0, 22.0], [20.0, np.nan, 30.0, np.nan], [24.0, np.nan, np.nan, np.nan], [np.nan] * 4)
+    assert found.means == pytest.approx([22.0, 25.0, 24.0, np.nan], nan_ok=True)
+    assert found.sd == pytest.approx([math.sqrt(8 / 3), math.sqrt(50.0), np.nan, np.nan], nan_ok=True)
+    assert found.standard_error[:3] == pytest.approx([1.5 / 2, 1.5 / math.sqrt(2), 1.5])
+    assert found.relative_error_percent == pytest.approx([12.0, 0.0, 4.0, np.nan], nan_ok=True)
+
+
+def test_two_steps_that_differ_so_much_are_told_apart_by_80_percent():
+    """Two means of four pours each, their scatter known by the pilot's eight degrees of freedom."""
+    found = walk([20.0] * 4, [21.0] * 4)
+    assert seen(found.smallest_difference, 1.5 * math.sqrt(2 / 4), 8) == pytest.approx(0.8, abs=1e-3)
+
+
+def test_a_target_of_zero_has_no_relative_error():
+    found = walk([1.0] * 4, [-1.0] * 4, target=dataclasses.replace(TARGET, mean=0.0))
+    assert np.isnan(found.relative_error_percent).all()
+
+
+def test_a_walk_to_several_targets_counts_the_errors_of_both_sides():
+    """√((1.5/2)² + (1.2/3)²) = 0.85 of the first, 1.5/2 of one that is exact."""
+    exact = Target("apex_height_m", 24.0)
+    found = _approach([walk([25.0] * 4, [26.7] * 4), walk([24.0] * 4, [22.5] * 4)], [TARGET, exact])
+    assert found.standardised == pytest.approx(np.array([[0.0, 2.0], [0.0, -2.0]]))
+
+
+@pytest.mark.parametrize("names", ["AB", "BA"])
+def test_the_factor_that_the_surface_tells_worst_is_the_one_that_counts(names):
+    """3² points of which B moves by half, three runs each: Var(b_B) = s²/(27 · 2/3 · 1/4), 21 degrees of freedom."""
+    levels = (-1.0, 0.0, 1.0)
+    design = np.array([(a, b / 2) for a in levels for b in levels])[:, [0, 1] if names == "AB" else [1, 0]]
+    region = Region(tuple(names), np.zeros(2), np.ones(2), ())
+    model = fit_surface(design, 20 + np.random.default_rng(2).normal(0, 1.3, (9, 3)), region)
+    error = 2 * math.sqrt(model.mse / (27 * 2 / 3 / 4))
+    assert seen(_smallest_main_effect(model), error, 27 - 6) == pytest.approx(0.8, abs=1e-3)
+
+
+def test_the_verification_could_have_seen_what_welch_s_test_sees():
+    runs, other = np.random.default_rng(1).normal(24.0, 2.0, 7), np.random.default_rng(2).normal(25.0, 1.0, 12)
+    test = stats.ttest_ind(runs, other, equal_var=False)
+    error = (runs.mean() - other.mean()) / test.statistic
+    found = _smallest_difference(verify(runs, other.mean(), other.std(ddof=1), 12))
+    assert seen(found, error, test.df) == pytest.approx(0.8, abs=1e-3)
+    # A bare printed mean is exact: t with the six degrees of freedom of the runs.
+    bare = _smallest_difference(verify(runs, 25.0, None, None))
+    assert seen(bare, runs.std(ddof=1) / math.sqrt(7), 6) == pytest.approx(0.8, abs=1e-3)
+    assert math.isnan(_smallest_difference(verify(runs[:1], 25.0, 1.0, 12)))
