@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from doe.errors import StatisticsError
 from doe.holdout import OVERALL, HoldoutCondition, MeasuredReplicates, holdout_errors
@@ -116,3 +117,54 @@ def test_single_readings_of_a_right_model_are_at_the_noise_floor_and_covered():
     # The floor is by 20 pours; 600 squares of a normal number leave 0.06 of their mean.
     assert np.mean([row.ratio**2 for row in found]) == pytest.approx(19.0 / 17.0, abs=0.18)
     assert np.mean([row.coverage_after for row in found]) == pytest.approx(0.9, abs=0.04)
+
+
+def test_each_model_is_freed_from_its_own_noise():
+    """By hand: s²/n of the data 1, of the base model 4, of the final one 0; 4² − 5 before and 0 − 1 after."""
+    measured, constant = np.array([[1.0], [3.0]]), np.array([[2.0], [2.0]])
+    row = holdout_errors([compared(("x",), measured, np.array([[4.0], [8.0]]), constant)])[0]
+    assert row.skill == pytest.approx(1.0 - (0.0 - 1.0) / (16.0 - 5.0))
+    assert row.noise_floor == pytest.approx(1.0)
+    assert row.ratio == pytest.approx(0.0)
+
+
+def test_the_interval_of_the_skill_is_that_of_the_resamples():
+    """A reading of error u that the final model meets, far from the base model's: (b² − 2f)(1 − skill) is u² (Z² − 2)
+    in the resamples, Z² chi-squared with one degree of freedom. The base model's own noise, (10 u)², is not in it.
+    """
+    u, b = 0.1, 1000.0
+    before, after = b * u + u * np.array([[-10.0], [10.0]]), np.zeros((2, 1))
+    rows = holdout_errors([compared(("x",), np.zeros((1, 1)), before, after, stated=u)], samples=20_000)
+    for row in rows:
+        # b² is resampled to 2 %; 20 000 draws leave 0.08 of the 97.5 % quantile of 5.02.
+        for skill, share in ((row.skill_low, 0.975), (row.skill_high, 0.025)):
+            assert (1.0 - skill) * b**2 == pytest.approx(stats.chi2.ppf(share, 1) - 2.0, abs=0.35)
+
+
+@pytest.mark.parametrize(("inside", "outside"), [(10.9, 11.0), (-10.9, -11.0)])
+def test_a_measured_pour_is_covered_within_the_interval_of_one_more_pour(inside, outside):
+    """Pours 0 and 2: mean 1, s² = 2, t(0.95, 1) = 6.3138; 6.3138 √(2 (1 + 1/2)) = 10.936."""
+    pours, far = np.array([[0.0], [2.0]]), np.array([[1000.0], [1002.0]])
+    (row, _) = holdout_errors([compared(("x",), 1.0 + np.array([[inside], [outside]]), far, pours)])
+    assert (row.coverage_before, row.coverage_after) == (0.0, 0.5)
+
+
+@pytest.mark.parametrize(("off", "covered"), [(12.5, 1.0), (12.7, 0.0)])
+def test_a_single_mean_is_covered_within_its_share_of_the_scatter_and_its_instrument(off, covered):
+    """The mean of four pours with u² = 2.5: 6.3138 √(2 (1/4 + 1/2) + 2.5) = 12.628."""
+    pours = np.array([[0.0], [2.0]])
+    one = compared(("x",), np.array([[1.0 + off]]), pours, pours, stated=np.sqrt(2.5), mean_of=4)
+    assert holdout_errors([one])[0].coverage_after == covered
+
+
+def test_what_never_varies_counts_in_its_own_unit():
+    same = np.full((2, 1), 2.0)
+    row = holdout_errors([compared(("x",), same, same + 3.0, same)])[-1]
+    assert (row.before, row.after, row.skill) == (3.0, 0.0, 1.0)
+    assert np.isnan(row.ratio)
+
+
+def test_the_deviation_of_replicates_is_their_own_and_of_a_single_one_what_is_stated():
+    several = MeasuredReplicates("c", ("x",), np.array([[1.0], [3.0]]), np.array([9.0]))
+    assert several.deviation == pytest.approx([np.sqrt(2.0)])
+    assert replace(several, values=several.values[:1]).deviation == pytest.approx([9.0])
