@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from scipy import stats
+from statsmodels.stats.power import TTestIndPower
 
 from doe.population import PLANNED, Population, compared
 from doe.store import Store
@@ -94,6 +95,14 @@ def test_with_several_pours_of_both_it_is_welchs_test():
     assert found.difference - found.half_width == pytest.approx(test.low)
     assert (found.pours, found.former) == (3, 4)
     assert found.distinguishable == (test.high < 0 or test.low > 0)
+
+
+def test_pours_of_both_settings_say_how_far_seeds_scatter():
+    """By hand: squares 30 about 22 and 14 about 16, five degrees of freedom; the effect size by statsmodels."""
+    found = compared(population(14.0, 15.0, 19.0), math.nan, population(18.0, 21.0, 24.0, 25.0))
+    size = TTestIndPower().solve_power(nobs1=PLANNED, power=0.8, alpha=0.05)
+    # Its search for a root stops at 1e-6 or so.
+    assert found.resolved == pytest.approx(size * math.sqrt(44.0 / 5.0), rel=1e-5)
 
 
 def test_the_difference_that_more_pours_would_show_is_shown_by_80_percent_of_them():

@@ -51,6 +51,14 @@ def test_more_replicates_resolve_smaller_effects():
     assert all(r.main_effect_bonferroni > r.main_effect for r in resolutions[1:])
 
 
+def test_half_the_efficiency_takes_twice_the_information():
+    """SE = 2 sigma/√(efficiency × rows × replicates), with the same degrees of freedom."""
+    whole, half = (resolution(5.0, 3, 28, 24, efficiency) for efficiency in (1.0, 0.5))
+    assert half.main_effect == pytest.approx(math.sqrt(2) * whole.main_effect)
+    assert half.main_effect_bonferroni == pytest.approx(math.sqrt(2) * whole.main_effect_bonferroni)
+    assert half.difference == whole.difference
+
+
 @pytest.mark.parametrize(
     "call, message",
     [

@@ -26,6 +26,12 @@ def test_main_effect_of_a_two_level_design_has_its_closed_form():
     assert found.power == pytest.approx(t_test_power(3.0, found.standard_error, 5), rel=1e-12)
 
 
+def test_the_term_that_is_told_worst_stands_for_its_kind():
+    """A at ±1 and B at ±1/2 in four runs: Var(b_B) = sigma²/(4/4)."""
+    (found,) = precision(factorial(2) * [1.0, 0.5], "AB", terms_of("AB", "linear"), 1.5)
+    assert found.standard_error == pytest.approx(2 * 1.5, rel=1e-12)
+
+
 def test_box_behnken_has_the_variances_of_its_table():
     """Box and Behnken 1960, 3 factors, 5 centre runs: sigma²/8 for a slope, sigma²/4 for a product."""
     factor, interaction, square = precision(box_behnken(3, 5).astype(float), "ABC", terms_of("ABC", "quadratic"), 1.0)

@@ -88,6 +88,19 @@ def test_the_papers_own_runs_cannot_tell():
     assert found.relative_error_percent == pytest.approx(0.945, abs=0.0005)
 
 
+def test_a_verdict_stands_on_the_intervals_of_scipy():
+    """95 % for the difference, 90 % for two one-sided tests at 5 %."""
+    found = verified(FIRST, SECOND.mean(), SECOND.std(ddof=1), SECOND.size)
+    other = stats.ttest_ind(FIRST, SECOND, equal_var=False)
+    for test, level in ((found.welch, 0.95), (found.equivalence, 0.90)):
+        ends = other.confidence_interval(level)
+        assert test.level == pytest.approx(level)
+        assert (test.low, test.high) == pytest.approx((ends.low, ends.high))
+    assert found.pooled.p == pytest.approx(stats.ttest_ind(FIRST, SECOND).pvalue)
+    assert found.one_sample.p == pytest.approx(stats.ttest_1samp(FIRST, SECOND.mean()).pvalue)
+    assert found.deciding is found.welch
+
+
 def test_many_close_runs_are_equivalent():
     found = verified(24.9 + 1.5 * stats.norm.ppf((np.arange(20) + 0.5) / 20), 24.68, 1.6, 10)
     assert found.verdict == "equivalent"
