@@ -45,6 +45,17 @@ def test_left_out_runs_are_those_of_refits_without_them():
     assert found.press == pytest.approx((found.left_out**2).sum())
 
 
+def test_signal_and_mean_are_those_of_generalised_least_squares():
+    """(y − m)' R⁻¹ (y − m)/(n − 1) about the m that makes it least, with the correlations that were found."""
+    points, y = runs(0.1)
+    found = fit_process(points, y, REGION)
+    r = correlations(points, points, found.lengths) + (found.noise / found.signal) ** 2 * np.eye(25)
+    ones, values = np.ones(25), y[:, 0]
+    mean = ones @ np.linalg.solve(r, values) / (ones @ np.linalg.solve(r, ones))
+    assert found.mean == pytest.approx(mean)
+    assert found.signal**2 == pytest.approx((values - mean) @ np.linalg.solve(r, values - mean) / 24)
+
+
 def test_left_out_rows_are_those_of_refits_without_their_replicates():
     points, y = runs(0.3, n=12, replicates=3)
     found = fit_process(points, y, REGION)
@@ -55,6 +66,9 @@ def test_left_out_rows_are_those_of_refits_without_their_replicates():
         squares += float(((y[k] - mean) ** 2).sum())
     assert found.press_by_row == pytest.approx(squares, rel=1e-6)
     assert found.press_by_row > found.press  # replicates give their row away
+    total = ((y - y.mean()) ** 2).sum()
+    assert found.r_squared_predicted == pytest.approx(1 - found.press / total)
+    assert found.r_squared_predicted_by_row == pytest.approx(1 - squares / total)
 
 
 def test_prediction_and_its_error_are_those_of_the_kriging_system():
@@ -119,8 +133,26 @@ def test_the_setting_for_a_target_is_where_the_function_gives_it_nearest_the_ref
     out = process_target(found, ResponseTarget(9.0, 0.0, np.array([50.0, 5.0])))
     assert not out.reached
     assert out.reachable_high == pytest.approx(4.5, abs=0.03)  # sin = 1 at A = π/5, B = ±1
+    assert out.reachable_low == pytest.approx(2.0, abs=0.03)  # sin = −1 at A = −π/5, B = 0
     assert out.point[0] == pytest.approx(50 + 10 * np.pi / 5, abs=0.3)
     assert np.isnan(out.compatible_low).all()
+
+
+@pytest.mark.parametrize("error", [0.0, 0.3])
+def test_what_is_compatible_with_a_target_is_what_lies_within_1_96_standard_errors(error):
+    """Of 10 000 places drawn evenly; both shares are known to half a hundredth."""
+    found = fit_process(*runs(0.2), REGION)
+    answer = process_target(found, ResponseTarget(3.5, error, np.array([50.0, 5.0])))
+    places = np.random.default_rng(7).uniform(-1, 1, (10_000, 2))
+    margin = 1.96 * np.sqrt(found.standard_error(places) ** 2 + error**2)
+    near = places[np.abs(found.predict(places) - 3.5) <= margin]
+    assert answer.compatible_share == pytest.approx(len(near) / 10_000, abs=0.02)
+    assert (answer.compatible_low - REGION.centre) / REGION.half_width == pytest.approx(near.min(axis=0), abs=0.05)
+    assert (answer.compatible_high - REGION.centre) / REGION.half_width == pytest.approx(near.max(axis=0), abs=0.05)
+    half = 1.96 * found.standard_error((answer.point - REGION.centre) / REGION.half_width)
+    assert answer.predicted_high - answer.predicted == pytest.approx(half, rel=1e-4)
+    assert answer.predicted - answer.predicted_low == pytest.approx(half, rel=1e-4)
+    assert answer.reachable_low < found.predict(places).min() + 1e-6
 
 
 def test_scales_of_response_and_region_change_nothing_but_units():

@@ -125,6 +125,32 @@ def test_brute_force_monte_carlo_gives_the_same_of_curved_models_with_errors():
         assert [region(k).coded(end)[j] for end in (found.low, found.high)] == pytest.approx(ends, abs=0.02)
 
 
+def test_a_model_that_knows_one_end_better_is_integrated_with_its_error():
+    """One factor, by sums over 20 001 places: N(T; ŷ, s²) with s three times as large at one end as at the other."""
+    points = np.repeat([[-1.0], [-0.9], [-0.8], [1.0]], 3, axis=0)
+    values = 20.0 + points[:, 0] + 2.0 * np.random.default_rng(3).standard_normal(12)
+    model, goal = fit_surface(points, values[:, None], region(1), ["a"]), Target("y0", 21.0, 0.6, 9)
+    found = joint_posterior([model], [goal])
+    x = np.linspace(-1.0, 1.0, 20_001)[:, None]
+    ends = model.standard_error(np.array([[-1.0], [1.0]]))
+    assert ends[1] / ends[0] > 1.3
+    s2 = goal.standard_error**2 + model.standard_error(x) ** 2
+    weight = np.exp(-0.5 * (model.predict(x) - goal.mean) ** 2 / s2) / np.sqrt(s2)
+    weight /= weight.sum()
+    mean = weight @ x[:, 0]
+    # Cells of 1/200: 1e-5 of the region in the mean, as much in the rest.
+    assert region(1).coded(found.mean) == pytest.approx(mean, abs=2e-4)
+    assert found.sd / 2.0 == pytest.approx(np.sqrt(weight @ (x[:, 0] - mean) ** 2), rel=1e-3)
+    y = weight @ model.predict(x)
+    variance = weight @ ((model.predict(x) - y) ** 2 + model.standard_error(x) ** 2)
+    assert (found.predicted, found.predicted_sd) == (
+        pytest.approx(y, abs=1e-3),
+        pytest.approx(np.sqrt(variance), rel=1e-3),
+    )
+    # Nothing of the region is ruled out.
+    assert (found.axis_low, found.axis_high) == (pytest.approx([8.0]), pytest.approx([12.0]))
+
+
 def test_targets_that_no_setting_gives_have_a_small_chance():
     model = linear(2)[0]
     one, other = Target("y0", 21.0, 0.6, 9), Target("y1", 22.0, 0.6, 9)

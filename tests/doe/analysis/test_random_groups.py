@@ -7,7 +7,8 @@ import pytest
 import statsmodels.api as sm
 from scipy import stats
 
-from doe.analysis.random_groups import DROP, fit_random
+from doe.analysis.named_factors import columns_of
+from doe.analysis.random_groups import fit_random
 from doe.analysis.surface import Blocks
 from doe.designs import factorial
 from doe.designs.optimal import codes
@@ -58,6 +59,22 @@ def test_balanced_split_plot_is_that_of_the_expected_mean_squares(seed):
     for term, f, df in (("A", of_a / plots, 10), ("B", of_b / within, 34), ("A*B", of_ab / within, 34)):
         assert (tested[term].f, tested[term].df_error) == (pytest.approx(f), pytest.approx(df))
         assert tested[term].p == pytest.approx(stats.f.sf(f, 1, df))
+    # A coefficient by t has the p of its term by F; the mean has the error of the plots.
+    mean, *coefficients = found.coefficients
+    assert [one.p for one in coefficients] == pytest.approx([tested[one.term].p for one in coefficients])
+    assert (mean.standard_error, mean.df) == (pytest.approx(np.sqrt(plots / 48)), pytest.approx(10))
+    assert mean.p == pytest.approx(2 * stats.t.sf(abs(y.mean()) / np.sqrt(plots / 48), 10))
+    assert [one.share for one in found.components] == pytest.approx(
+        [(plots - within) / (plots + 3 * within), 4 * within / (plots + 3 * within)]
+    )
+    # What is predicted of a group, its own effect included, is on average nearer to its runs than without.
+    shrunk = (plots - within) / plots * (means - y.mean() - a * (means @ a) / 12)
+    assert found.effects == pytest.approx(shrunk)
+    assert found.predicted_in_group - found.predicted == pytest.approx(shrunk[plot])
+    # By the deviance of both variances, of which 34 ln s² + 10 ln(s² + 4 s_u²) is what they share.
+    least = 34 * (np.log(within) + 1) + 10 * (np.log(plots) + 1)
+    whole = (34 * within + 10 * plots) / 44
+    assert found.p_groups == pytest.approx(stats.chi2.sf(44 * (np.log(whole) + 1) - least, 1) / 2, rel=1e-6)
 
 
 def test_intervals_hold_what_the_closed_form_of_the_deviance_holds():
@@ -77,7 +94,8 @@ def test_intervals_hold_what_the_closed_form_of_the_deviance_holds():
         for end in (component.low, component.high):
             assert end > 0
             found_there = deviance(end, other) if which == 0 else deviance(other, end)
-            assert found_there.min() - least == pytest.approx(DROP, abs=1e-4)
+            # 3.8415: the 95 % point of chi-squared with one degree of freedom (tables).
+            assert found_there.min() - least == pytest.approx(3.8415, abs=2e-4)
 
 
 def test_a_split_plot_in_blocks_is_that_of_r():
@@ -141,6 +159,37 @@ def test_unbalanced_runs_are_those_of_statsmodels(seed):
     assert [one.value for one in found.coefficients] == pytest.approx(theirs.fe_params, rel=1e-4)
     assert found.deviance <= -2 * theirs.llf + 1e-8
     assert found.deviance == pytest.approx(-2 * theirs.llf, abs=1e-5)
+
+
+def test_degrees_of_freedom_of_unbalanced_names_are_those_of_the_full_matrices():
+    """Satterthwaite for either axis of the term, with ½ tr(P V_i P V_j); together by Fai and Cornelius 1996."""
+    random = np.random.default_rng(5)
+    # The first name stands in groups of its own, the others side by side: one is told between groups, one within.
+    group, name = np.repeat(np.arange(8), 4), np.tile([1, 2, 2, 1], 8)
+    name[:14] = 0
+    y = 2.0 * random.standard_normal(8)[group] + name + random.standard_normal(32)
+    coded = codes(3)[name][:, None]
+    found = fit_random(coded, y[:, None], region("A"), (("a", "b", "c"),), blocks_of(group))
+    between, within = (one.variance for one in found.components)
+    x, z = columns_of((3,), ("A",)).matrix(coded), np.eye(8)[group]
+    inverse = np.linalg.inv(within * np.eye(32) + between * z @ z.T)
+    covariance = np.linalg.inv(x.T @ inverse @ x)
+    p = inverse - inverse @ x @ covariance @ x.T @ inverse
+    parts = (np.eye(32), z @ z.T)
+    information = [[0.5 * np.trace(p @ one @ p @ other) for other in parts] for one in parts]
+    values, axes = np.linalg.eigh(covariance[1:, 1:])
+    df = []
+    for value, axis in zip(values, axes.T, strict=True):
+        weights = inverse @ x @ covariance[:, 1:] @ axis
+        slope = np.array([weights @ one @ weights for one in parts])
+        df.append(2 * value**2 / (slope @ np.linalg.solve(information, slope)))
+    assert max(df) > 1.1 * min(df)
+    expected = sum(one / (one - 2) for one in df)
+    (tested,) = found.tests
+    assert tested.df_error == pytest.approx(2 * expected / (expected - 2), rel=1e-5)
+    estimate = covariance @ x.T @ inverse @ y
+    assert tested.f == pytest.approx(estimate[1:] @ np.linalg.solve(covariance[1:, 1:], estimate[1:]) / 2, rel=1e-6)
+    assert tested.p == pytest.approx(stats.f.sf(tested.f, 2, tested.df_error))
 
 
 def test_groups_that_do_not_scatter_leave_least_squares():
