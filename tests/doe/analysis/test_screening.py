@@ -9,6 +9,7 @@ import pytest
 import statsmodels.formula.api as smf
 from scipy import stats
 from statsmodels.stats.anova import anova_lm
+from statsmodels.stats.multitest import multipletests
 
 from doe.analysis.screening import FALLBACK, SIGNIFICANT, analyse_screening, select_factors
 from doe.designs import plackett_burman
@@ -83,6 +84,12 @@ def test_complete_replicated_screening_agrees_with_statsmodels():
         assert effect.effect == pytest.approx(2 * fit.params[effect.name], abs=1e-10)
         assert effect.by_replicates.standard_error == pytest.approx(2 * fit.bse[effect.name])
         assert effect.by_replicates.p == pytest.approx(fit.pvalues[effect.name], rel=1e-8)
+        low, high = fit.conf_int().loc[effect.name]
+        assert screening.half_width(effect) == pytest.approx(high - low)
+    factors = [effect.by_replicates for effect in screening.effects[:24]]
+    for method, own in (("holm", "p_holm"), ("bonferroni", "p_bonferroni")):
+        adjusted = multipletests([one.p for one in factors], method=method)[1]
+        assert [getattr(one, own) for one in factors] == pytest.approx(adjusted)
     means = pd.DataFrame(DESIGN, columns=NAMES).assign(y=values.mean(axis=1))
     table = anova_lm(smf.ols("y ~ " + " + ".join(FACTORS), means).fit(), typ=3)
     for effect in screening.effects[:24]:
@@ -116,6 +123,18 @@ def test_unequal_replicates_give_the_variance_of_the_contrast():
     screening = screen(values, DUMMIES)
     expected = screening.pure_error.sigma * math.sqrt((27 / 2 + 1) / 14**2)
     assert screening.effects[0].by_replicates.standard_error == pytest.approx(expected)
+
+
+def test_what_the_factors_leave_is_the_lack_of_fit_of_statsmodels():
+    """Rows of one, two and three runs: the factors' model of all runs against a mean of its own for every row."""
+    values = planted({"X7": 2.0}, 1.0, 3) + (DESIGN[:, 6] * DESIGN[:, 3])[:, None]
+    values[:9, 1] = values[:5, 2] = np.nan
+    frame = pd.DataFrame(np.repeat(DESIGN, 3, axis=0), columns=NAMES)
+    frame = frame.assign(row=np.repeat(np.arange(28), 3), y=values.ravel()).dropna()
+    factors, rows = (smf.ols(f"y ~ {terms}", frame).fit() for terms in (" + ".join(FACTORS), "C(row)"))
+    f, p, _ = rows.compare_f_test(factors)
+    found = screen(values, DUMMIES)
+    assert (found.unexplained_f, found.unexplained_p) == (pytest.approx(f), pytest.approx(p))
 
 
 @pytest.mark.parametrize("missing", [[1, 5, 9, 13], [1, 5, 9]])
@@ -156,6 +175,14 @@ def test_margins_are_those_of_the_design_in_units_of_sigma():
     assert pure.margin_bonferroni / pure.sigma == pytest.approx(0.91, abs=0.005)
     assert dummy.margin / dummy.sigma == pytest.approx(1.20, abs=0.005)
     assert dummy.margin_bonferroni / dummy.sigma == pytest.approx(3.81, abs=0.005)
+    for error in (pure, dummy):
+        for change, alpha in (
+            (error.smallest_detectable_effect, 0.05),
+            (error.smallest_detectable_effect_bonferroni, 0.05 / 24),
+        ):
+            # Two-sided, seen with a chance of 0.8; the far tail is negligible.
+            t = stats.nct(error.df, change / error.standard_error)
+            assert t.sf(stats.t.isf(alpha / 2, error.df)) == pytest.approx(0.8, abs=1e-3)
     assert dummy.t_limit == pytest.approx(3.182, abs=5e-4)
     assert dummy.t_limit_bonferroni == pytest.approx(10.07, abs=5e-3)
 
@@ -206,6 +233,13 @@ def test_selection_skips_what_was_given_up_for_one_target_and_estimated_for_anot
     further = {"other": screen(planted({"X12": 8.0}, 1.0, 3), DUMMIES)}
     chosen = select_factors(first, 2, fallback=["X7"], exclude=["X12"], further=further)
     assert [c.name for c in chosen] == ["X9", "X7"]
+
+
+def test_a_factor_of_several_targets_stands_where_it_acts_most():
+    first, second = (screen(planted(effects, 1.0, 3), DUMMIES) for effects in ({"X9": 8.0, "X4": 4.0}, {"X9": 2.0}))
+    for one, further in ((first, {"other": second}), (second, {"other": first})):
+        assert [chosen.name for chosen in select_factors(one, 2, further=further)] == ["X9", "X4"]
+    assert select_factors(second, 2, further={"other": first})[1].reason == f"{SIGNIFICANT} in other"
 
 
 def test_selection_refuses_a_short_fallback_and_unknown_names():

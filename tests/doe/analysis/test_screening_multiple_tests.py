@@ -27,5 +27,18 @@ def test_lenth_by_hand():
     assert found.simultaneous_margin > found.margin
 
 
+def test_lenth_leaves_out_what_is_two_and_a_half_times_the_first_error():
+    """|c| = 1, 2, 3, 4 and s0 = 4.5: 12 is above 11.25, 11 is not, and then PSE = 1.5 x 3."""
+    assert lenth(np.array([1.0, 2.0, 3.0, 4.0, 12.0])).pseudo_standard_error == pytest.approx(3.75)
+    assert lenth(np.array([1.0, 2.0, 3.0, 4.0, 11.0])).pseudo_standard_error == pytest.approx(4.5)
+
+
+def test_lenth_s_margins_of_fifteen_effects_are_those_of_his_table():
+    """Lenth 1989, for 16 runs: 2.57 PSE for one effect, 5.22 PSE for all of them."""
+    found = lenth(np.arange(1.0, 16.0))
+    assert found.margin / found.pseudo_standard_error == pytest.approx(2.57, abs=0.005)
+    assert found.simultaneous_margin / found.pseudo_standard_error == pytest.approx(5.22, abs=0.005)
+
+
 def test_lenth_of_nothing_is_nothing():
     assert lenth(np.zeros(27)).margin == 0.0

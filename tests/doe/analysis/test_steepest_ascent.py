@@ -100,6 +100,14 @@ def test_the_region_is_centred_on_the_bracket():
     assert region.coded(region.natural([0.3, -1, 1])) == pytest.approx([0.3, -1, 1])
 
 
+def test_the_region_reaches_one_step_to_each_side():
+    """A third of the range of the base factor; a sixth and a twelfth of the others are widened to a quarter."""
+    path = ascent_path(FACTORS, 24.0, steps=4)
+    region = region_around(path, bracket([20, 22, 24, 26], 23.0))
+    assert region.half_width == pytest.approx([0.25 * 30.0, 0.4 / 3, 0.25 * 0.2])
+    assert [note.split()[3] for note in region.notes if "widened" in note] == ["shear_modulus", "restitution"]
+
+
 @given(
     position=st.floats(0, 5),
     effects=st.tuples(*[st.floats(-5, 5)] * 3).filter(lambda e: max(map(abs, e)) > 1e-3),
@@ -224,6 +232,31 @@ def test_the_walk_comes_nearest_to_all_targets_between_its_steps():
     means[1] = np.nan
     with pytest.raises(StatisticsError, match="for every target"):
         found(1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("standardised", "resolved"),
+    [
+        (np.arange(6.0) - 2.5, True),  # J rises to 6.25 on both sides
+        (0.8 * (np.arange(6.0) - 2.5), True),  # to 4
+        (0.75 * (np.arange(6.0) - 2.5), False),  # to 3.52, below 3.84
+        (np.arange(6.0) - 4.5, False),  # to 20 on one side alone
+        (np.array([-0.5, 3.0]), False),  # what is beyond the least on one side tells nothing of the other
+        (np.array([-2.0, 3.0]), True),
+    ],
+)
+def test_a_place_is_told_where_the_misfit_rises_on_both_sides(standardised, resolved):
+    """By more than 3.84, the 95 % point of chi-squared with one degree of freedom."""
+    found = approach([20.0 + standardised], [20.0], np.ones((1, standardised.size)), [1.0], [2.0])
+    assert found.resolved is resolved
+
+
+@pytest.mark.parametrize(("missed", "reached"), [(1.9, True), (2.1, False), (-2.1, False)])
+def test_every_target_has_to_be_met_within_two_standard_errors(missed, reached):
+    steps = np.arange(6.0)
+    found = approach([steps, np.full(6, 50.0 + missed)], [2.5, 50.0], np.ones((2, 6)), [1.0, 1.0], [2.0, 2.0])
+    assert found.missed == pytest.approx([0.0, missed])
+    assert found.reached is reached
 
 
 def test_bracket_and_region_refuse_nonsense():
