@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from doe.laboratory import LaboratoryError, analyse
+from doe.laboratory.hertz import EXACT, S368
 from tests.doe.laboratory.readings import assert_one_line, written
 
 BY_AREA = Path(__file__).parent / "hertz_yield.csv"
@@ -105,6 +106,8 @@ def test_noise_is_told(noise, said, tmp_path):
 def test_a_long_toe_is_fitted_and_told(toe, said, tmp_path):
     result = analyse("compression", written(tmp_path, sphere(toe=toe)))
     assert result.derived[0].values == pytest.approx((100e6,) * 3, rel=1e-4)
+    # The standard's rounded constant, at one point whose way is counted from the contact too.
+    assert result.derived[1].values == pytest.approx((100e6 * S368 / EXACT,) * 3, rel=1e-4)
     assert ("a long toe in replicates 0, 1, 2" in notes(result)) == said
 
 

@@ -100,6 +100,24 @@ def test_noise_moves_the_stiffness_by_what_it_must():
     assert np.sqrt(np.mean(np.square(errors))) < 1e-2
 
 
+def test_a_scale_that_begins_elsewhere_moves_every_place_and_nothing_else():
+    x, force = curve(toe=0.1e-3, yields=0.5e-3)
+    here, there = hertz_range(x, force), hertz_range(x + 2e-3, force)
+    for place in ("first_displacement", "last_displacement", "origin", "yield_displacement"):
+        assert getattr(there, place) - getattr(here, place) == pytest.approx(2e-3, abs=1e-9)
+    assert there.stiffness == pytest.approx(here.stiffness, rel=1e-6)
+    assert (there.yield_force, there.last_force) == (pytest.approx(here.yield_force), pytest.approx(here.last_force))
+
+
+def test_the_standard_error_is_the_scatter_of_the_stiffness():
+    """Forty curves with noise of 0.3 % of the peak: their deviation is known to a ninth of itself."""
+    found = [hertz_range(*curve(noise=0.003, seed=seed)) for seed in range(40)]
+    scatter = np.std([one.stiffness for one in found], ddof=1)
+    assert np.mean([one.standard_error for one in found]) == pytest.approx(scatter, rel=0.35)
+    inside = [abs(one.stiffness - STIFFNESS) < 2.0 * one.standard_error for one in found]
+    assert np.mean(inside) > 0.8
+
+
 @pytest.mark.parametrize("exponent", [1.0, 1.3, 2.0])
 @pytest.mark.parametrize("noise", [0.0, 0.002])
 def test_another_exponent_is_not_hertz_s(exponent, noise):

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from doe.errors import StatisticsError
-from doe.laboratory.linear_range import LEAST_SPAN, linear_range, noise_of
+from doe.laboratory.linear_range import LEAST_SPAN, linear_range, noise_of, relative_noise
 
 SLOPE = 1e6
 """Of every straight part [N/m]."""
@@ -41,6 +42,17 @@ def test_noise_moves_the_slope_by_what_it_must(toe, end):
     """0.3 % of the peak, 200 points: RMS error over ten draws below 0.5 % (by the line alone, 0.06 … 0.4 %)."""
     errors = [linear_range(*curve(200, toe, end, noise=0.003, seed=seed)).slope / SLOPE - 1.0 for seed in range(10)]
     assert np.sqrt(np.mean(np.square(errors))) < 5e-3
+
+
+def test_the_line_and_its_error_are_those_of_scipy():
+    x, force = curve(200, 0.1, 0.6, noise=0.003)
+    found = linear_range(x, force)
+    used = (x >= found.first_displacement) & (x <= found.last_displacement)
+    other = stats.linregress(x[used], force[used])
+    assert found.points == used.sum()
+    assert (found.slope, found.standard_error) == (pytest.approx(other.slope), pytest.approx(other.stderr))
+    assert found.r_squared == pytest.approx(other.rvalue**2)
+    assert found.origin == pytest.approx(-other.intercept / other.slope)
 
 
 def test_the_toe_is_where_the_line_meets_zero():
@@ -84,6 +96,8 @@ def test_noise_is_that_of_a_point():
     # The median of 4000 has a standard error of 2 %.
     assert noise_of(x, x + noise) == pytest.approx(0.02, rel=0.08)
     assert noise_of(x, 3.0 * x) == pytest.approx(0.0, abs=1e-12)
+    # In proportion to the force; of the nine tenths above a tenth of the largest.
+    assert relative_noise(x, 3.0 * x * (1.0 + noise)) == pytest.approx(0.02, rel=0.08)
 
 
 @pytest.mark.parametrize(

@@ -92,6 +92,8 @@ def test_errors_and_scatter_together_by_hand():
     assert found.df == pytest.approx(3 * (5 / 3) ** 4)
     assert (found.low, found.high) == pytest.approx((10.0 - 1.0340, 10.0 + 1.0340), abs=1e-4)  # t = 2.0679
     assert reading_error([math.nan] * 4, summary) is None
+    # Replicates whose sheet declares none are taken to be read as well as the others.
+    assert reading_error([0.4, math.nan, 0.4, math.nan], summary).standard == pytest.approx(0.4)
     # The column beside a reading that the quantity does not hang on.
     assert reading_error([0.0] * 4, summary) is None
 

@@ -33,6 +33,14 @@ def test_grubbs_s_test_on_the_uranium_data():
     assert outliers(URANIUM) == (7,)
 
 
+def test_all_of_several_outliers_are_named():
+    """Each is beyond its own critical value: 3.17 > 2.71 of twenty, 3.92 > 2.68 of nineteen; 1.59 < 2.65 is not."""
+    values = [*np.linspace(-1.0, 1.0, 18), 9.0, -8.0]
+    over = [deviate > critical_deviate(20, removed) for removed, (_, deviate) in enumerate(deviates(values, 4))]
+    assert over == [True, True, False, False]
+    assert outliers(values) == (18, 19)
+
+
 def test_how_many_may_be_named():
     assert [most_outliers(n) for n in (0, 2, 3, 10, 14, 15, 50)] == [0, 0, 1, 1, 1, 3, 10]
 
