@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from doe.laboratory import LaboratoryError, analyse
 from doe.laboratory.hertz import EXACT, S368
@@ -26,14 +27,14 @@ def with_radius(tmp_path, columns=BODY, cells="5,0.3,2"):
     return written(tmp_path, HEAD.replace(BODY, columns) + "\n".join(lines))
 
 
-def sphere(noise=0.0, points=60, toe=0.0, replicates=3):
+def sphere(noise=0.0, points=60, toe=0.0, replicates=3, begin=0.0):
     """Rows of HEAD of a sphere, R 5 mm, 100 MPa, ν 0.3, one contact: 4/3 · 100/0.91 · √5 = 327.629 N/mm^1.5."""
     rng = np.random.default_rng(3)
     x = np.linspace(0.0, 0.2, points)
     rows = []
     for replicate in range(replicates):
         force = 327.629 * np.maximum(x - toe, 0.0) ** 1.5 * (1.0 + noise * rng.standard_normal(points))
-        rows += [f"s,{replicate},5,0.3,1,{a:.5f},{f:.6f}" for a, f in zip(x, force, strict=True)]
+        rows += [f"s,{replicate},5,0.3,1,{begin + a:.5f},{f:.6f}" for a, f in zip(x, force, strict=True)]
     return HEAD + "\n".join(rows)
 
 
@@ -96,6 +97,20 @@ def test_one_curve_has_the_interval_of_its_fit_alone(tmp_path):
     assert np.isnan(result.derived[0].summary.low)
 
 
+def test_the_interval_of_one_straight_curve_is_scipy_s(tmp_path):
+    """slope ± t stderr of the points of the straight part, times 5 mm over 20 mm²."""
+    x = np.linspace(0.0, 0.1, 60)
+    force = np.round(600.0 * x + 0.1 * np.random.default_rng(4).standard_normal(60), 4)
+    rows = [f"s,1,5,20,{a:.7f},{f:.4f}" for a, f in zip(x, force, strict=True)]
+    result = analyse("compression", written(tmp_path, FLAT_HEAD + "\n".join(rows)))
+    (fit,) = (one.fit for one in result.curves)
+    used = (x >= 1e3 * fit.first_displacement - 1e-6) & (x <= 1e3 * fit.last_displacement + 1e-6)
+    line = stats.linregress(x[used], force[used])
+    half = stats.t.ppf(0.975, used.sum() - 2) * line.stderr
+    low, high = (0.25 * (line.slope + sign * half) for sign in (-1.0, 1.0))
+    assert f"the 95 % interval of its fit, {low:.4g} … {high:.4g} MPa" in notes(result)
+
+
 @pytest.mark.parametrize(("noise", "said"), [(0.002, False), (0.03, True)])
 def test_noise_is_told(noise, said, tmp_path):
     result = analyse("compression", written(tmp_path, sphere(noise=noise, points=120)))
@@ -103,8 +118,9 @@ def test_noise_is_told(noise, said, tmp_path):
 
 
 @pytest.mark.parametrize(("toe", "said"), [(0.01, False), (0.08, True)])
-def test_a_long_toe_is_fitted_and_told(toe, said, tmp_path):
-    result = analyse("compression", written(tmp_path, sphere(toe=toe)))
+@pytest.mark.parametrize("begin", [0.0, 3.0])
+def test_a_long_toe_is_fitted_and_told(toe, said, begin, tmp_path):
+    result = analyse("compression", written(tmp_path, sphere(toe=toe, begin=begin)))
     assert result.derived[0].values == pytest.approx((100e6,) * 3, rel=1e-4)
     # The standard's rounded constant, at one point whose way is counted from the contact too.
     assert result.derived[1].values == pytest.approx((100e6 * S368 / EXACT,) * 3, rel=1e-4)

@@ -62,6 +62,17 @@ def test_the_frame_is_that_of_the_declared_scene(trefoil):
     assert 0.02 < frame.radius < 0.1
 
 
+def test_the_frame_of_a_mixture_has_the_solid_volume_of_its_parts(trefoil):
+    """Half of the mass each of 1000 and of 3000 kg/m³: the cube of the radius is the mean of both alone."""
+    scene, (body,) = trefoil.scene, trefoil.scene.bodies
+    light, heavy = (dataclasses.replace(body, name=name, density=rho) for name, rho in (("a", 1e3), ("b", 3e3)))
+    alone = [frame_of_scene(dataclasses.replace(scene, bodies=(one,))).radius for one in (light, heavy)]
+    halves = tuple(dataclasses.replace(one, mass_fraction=0.5) for one in (light, heavy))
+    mixed = frame_of_scene(dataclasses.replace(scene, bodies=halves))
+    assert mixed.radius**3 == pytest.approx((alone[0] ** 3 + alone[1] ** 3) / 2)
+    assert alone[0] == pytest.approx(3 ** (1 / 3) * alone[1])
+
+
 def test_what_is_offered_follows_from_what_is_there(trefoil):
     assert offer_of(trefoil) == SCAN
     listed = dataclasses.replace(trefoil, surfaces={})
@@ -118,6 +129,8 @@ def test_listed_heights_are_averaged_over_rings(trefoil):
     low, high = frame.ring_width, 2.0 * frame.ring_width
     assert found[1] == pytest.approx(0.03 - 0.4 * (high**3 - low**3) / (3.0 * (high**2 - low**2)), rel=1e-3)
     assert found[-1] == 0.0
+    # The first height holds down to the axis.
+    assert ring_heights(places[places > low], np.full((places > low).sum(), 0.02), frame)[0] == pytest.approx(0.02)
 
 
 def test_listed_heights_give_the_profile_of_data_and_run(trefoil, pour):

@@ -24,6 +24,13 @@ def test_resolution_by_hand(tmp_path):
     assert angle.half_width == pytest.approx(12.706, rel=1e-4)
 
 
+def test_a_single_reading_is_known_to_its_stated_uncertainty(tmp_path):
+    text = MEASUREMENT + "\n[uncertainty]\nangle_of_repose_deg = 0.5\n"
+    (angle,) = reach(tmp_path, HEAD + "1,angle_of_repose_deg,,20\n", text).conditions[0].resolutions
+    assert (angle.replicates, angle.sd, angle.standard_error) == (1, 0.5, 0.5)
+    assert angle.half_width == pytest.approx(1.96 * 0.5, rel=1e-4)
+
+
 def test_one_number_fits_exactly(tmp_path):
     found = reach(tmp_path)
     assert (found.equations, found.unknowns) == (1, 1)
@@ -33,7 +40,10 @@ def test_one_number_fits_exactly(tmp_path):
 def test_no_more_summaries_than_parameters_is_a_warning(tmp_path):
     table = ANGLE + "1,apex_height_m,,0.02\n2,apex_height_m,,0.021\n"
     text = changed(MEASUREMENT, "[parameters]", '[parameters]\n"pair.glass.glass.restitution" = {low=0.1, high=0.9}')
-    assert reach(tmp_path, table, text).warnings[0].startswith("2 summaries against 2 free parameters")
+    nothing, little = "the model can fit what it lacks; nothing can show", "little is left to judge the fit by"
+    assert reach(tmp_path / "two", table, text).warnings[0] == f"2 summaries against 2 free parameters: {nothing}"
+    table += "1,footprint_r50_m,,0.03\n2,footprint_r50_m,,0.04\n"
+    assert reach(tmp_path / "three", table, text).warnings[0] == f"3 summaries against 2 free parameters: {little}"
 
 
 def test_a_summary_without_scatter_is_no_equation(tmp_path):
