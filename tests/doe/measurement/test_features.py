@@ -115,6 +115,12 @@ def test_a_coarse_scan_says_nothing_of_single_bodies(trefoil, pour):
     assert "height_q90_m@1 x 2 mm" in feature_set(scanned(trefoil, pour.pile.spheres, 2e-3)).names
 
 
+@pytest.mark.parametrize(("grid", "times"), [(0.5e-3, 3), (0.7e-3, 2), (0.8e-3, 1), (1.5e-3, 1), (2e-3, 1)])
+def test_a_pixel_is_as_many_cells_as_fit_into_a_quarter_of_a_body(trefoil, pour, grid, times):
+    """1.5 mm of 6 mm, no more unless a cell is; the coarsest scan says how wide a cell is."""
+    assert cells_of(scanned(trefoil, pour.pile.spheres, grid)) == (grid, times)
+
+
 def test_a_scan_without_an_axis_says_nothing_of_where_the_pile_leans(trefoil, pour):
     names = plain(scanned(trefoil, pour.pile.spheres, 1e-3, on_axis=False))
     assert "ring_volume_m3" in names

@@ -113,9 +113,20 @@ def test_without_an_axis_the_centre_of_the_volume_stands_for_it(tmp_path):
     assert max(abs(x), abs(y)) < 0.2e-3
 
 
-def test_a_stated_plate_is_taken():
+def test_a_plate_that_lies_higher_is_found():
     places = points((0.003, 0.0, 0.0))
     assert found_plate(places) == pytest.approx((0.003, 0.0, 0.0), abs=0.02e-3)
+
+
+def test_a_stated_plate_is_taken_and_heights_are_those_along_its_normal(tmp_path):
+    """2 mm above z = 0.001 + 0.75 x are 2 mm · 4/5 along the normal of this plane, which no bare plate shows."""
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(20.0), np.arange(20.0)))
+    places = np.column_stack([1e-3 * x, 1e-3 * y, 0.001 + 0.75e-3 * x + 0.002])
+    write(tmp_path / "scan.xyz", places, 1.0)
+    scan = read_scan(tmp_path / "scan.xyz", ScanSettings(plate=(0.001, 0.75, 0.0), axis=(0.0, 0.0)))
+    # Written with six digits behind the point.
+    assert scan.points[:, 2] == pytest.approx(0.0016, abs=1e-6)
+    assert scan.points[:, :2] == pytest.approx(places[:, :2], abs=1e-6)
 
 
 def test_a_tilted_plate_is_found_beside_a_large_pile():

@@ -38,6 +38,19 @@ def test_a_wall_hides_what_is_behind_it_as_far_as_it_is_high():
     assert not shadow[40:].any()
 
 
+@pytest.mark.parametrize(("azimuth", "axis", "away"), [(0.0, 0, -1), (90.0, 1, -1), (180.0, 0, 1), (270.0, 1, 1)])
+def test_the_shadow_falls_away_from_the_camera(azimuth, axis, away):
+    """A post of one pixel, 5 mm high, at 45°: five pixels beyond it, seen from +x, +y, −x and −y; rows are x."""
+    height = np.zeros((N, N))
+    height[40, 40] = 5e-3
+    shadow = hidden(surface(height), Sight(math.radians(azimuth), math.radians(45.0)))
+    line = shadow[:, 40] if axis == 0 else shadow[40]
+    near = np.flatnonzero(line) - 40
+    # A place that is exactly as far as the post is high may be either.
+    assert set(away * near) in ({1, 2, 3, 4}, {1, 2, 3, 4, 5})
+    assert shadow.sum() == line.sum()
+
+
 def test_from_right_above_nothing_is_hidden():
     assert not hidden(grains(0), PERFECT).any()
     assert seen_through(grains(0), PERFECT).height is not None
