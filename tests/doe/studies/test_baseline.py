@@ -56,6 +56,16 @@ def test_noise_by_the_f_distribution(ratio, runs, answer):
     assert baseline._spreads(new, old)[0] == answer
 
 
+def test_the_ratio_of_two_spreads_has_the_interval_of_their_own_degrees_of_freedom():
+    """(s₂/s₁)²/F, F the 95 % and the 5 % point of 39 and 4 degrees of freedom."""
+    old, new = Noise(20.0, 1.0, 0.0, 0.0, 5), Noise(20.0, 2.0, 0.0, 0.0, 40)
+    low, high = (2.0 / math.sqrt(stats.f.ppf(share, 39, 4)) for share in (0.95, 0.05))
+    answer, why = baseline._spreads(old, new)
+    assert f"ratio {low:.3g} … {high:.3g} (90 %)" in why
+    assert answer == "cannot tell"
+    assert stats.f.sf(4.0, 39, 4) > 0.025
+
+
 def test_another_verdict_mean_noise_and_parameter_are_named(planted):
     (test,), name = planted.verification.tests, planted.verification.targets[0].observable
     away = dataclasses.replace(test.simulated, mean=test.simulated.mean + 9.0)
@@ -114,6 +124,9 @@ def test_parameters_by_their_intervals(planted, monkeypatch):
     assert answer(0.01, 0.02, True) == "same"
     assert answer(0.3, 0.1, True) == "moved"
     assert answer(0.12, 0.1, True) == "cannot tell"
+    # 95 % of both are ± 0.1: of the difference ± 0.1 √2. Of ± 0.02: 90 % are ± 0.02 √2 · 1.645/1.96 = 0.0237.
+    assert (answer(0.14, 0.1, True), answer(0.143, 0.1, True)) == ("cannot tell", "moved")
+    assert (answer(0.076, 0.02, True), answer(0.0765, 0.02, True)) == ("same", "moved")
     assert answer(0.1, 0.3, False) == "cannot tell"
     assert answer(0.7, 0.3, False) == "moved"
 

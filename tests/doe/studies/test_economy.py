@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from doe.run_records import Run
 from doe.studies.economy import COMPARED, ECONOMIES, compare, judged, pours_needed, rows_of, settings_of
@@ -68,6 +69,20 @@ def test_a_shift_of_half_a_standard_deviation_is_not_accepted():
     found = compare(STUDY, LARGER, Normal(shift=1.0), 1000)
     assert not any(one.equivalent for one in found.compared)
     assert not found.accepted
+
+
+def test_the_margin_is_that_of_the_full_settings_scatter():
+    """Pours 18 and 22 in turns, and 14 and 26: three tenths of 2 √(n/(n − 1)), whatever the economy scatters by."""
+    rows = []
+    for row in rows_of(STUDY, LARGER, 10):
+        half = 6.0 if LARGER.name in row.label else 2.0
+        found = [dict.fromkeys(COMPARED, 20.0 + half * (-1) ** k) for k in range(10)]
+        rows.append([Run(row.label, k, 0, k, "at_rest", "", one, 1.0, "") for k, one in enumerate(found)])
+    for one in judged(STUDY, LARGER, rows, 10).compared:
+        assert one.margin == pytest.approx(0.3 * 2.0 * np.sqrt(10 / 9))
+        # Welch, 90 %: standard error √((4 + 36)/9), degrees of freedom 9 (4 + 36)²/(4² + 36²).
+        half = stats.t.ppf(0.95, 9 * 40**2 / (4**2 + 36**2)) * np.sqrt(40 / 9)
+        assert (one.low, one.high) == (pytest.approx(-half), pytest.approx(half))
 
 
 def test_few_pours_prove_nothing():
