@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from doe.laboratory import tables
 from doe.laboratory.tables import DROP, FORCE_DISPLACEMENT, INCLINED_PLANE, LaboratoryError, read_table
 from tests.doe.laboratory.readings import assert_one_line, written
 
@@ -17,6 +18,28 @@ def test_units_of_the_names_are_turned_into_si(tmp_path):
     assert (row.of, row.replicate, row.line) == (("seed",), "1", 2)
     (row,) = read_table(written(tmp_path, PLANE + "a,b,1,45\n"), INCLINED_PLANE).rows
     assert row.values["angle"] == pytest.approx(math.pi / 4)
+
+
+@pytest.mark.parametrize(
+    ("units", "same"),
+    [
+        (tables.LENGTH, {"m": 0.25, "cm": 25, "mm": 250, "um": 250_000}),
+        (tables.AREA, {"m2": 0.002, "cm2": 20, "mm2": 2000}),
+        (tables.VOLUME, {"m3": 0.003, "l": 3, "cm3": 3000, "ml": 3000}),
+        (tables.MASS, {"kg": 0.5, "g": 500, "mg": 500_000}),
+        (tables.DENSITY, {"kg_m3": 998, "g_cm3": 0.998}),
+        (tables.FORCE, {"N": 40, "kN": 0.04, "mN": 40_000}),
+        (tables.SPEED, {"m_s": 1.5, "cm_s": 150, "mm_s": 1500}),
+        (tables.TIME, {"s": 90, "ms": 90_000, "min": 1.5}),
+        (tables.ANGLE, {"rad": math.pi / 3, "deg": 60}),
+        (tables.TURNING, {"rad_s": 2 * math.pi, "rpm": 60}),
+    ],
+)
+def test_a_quantity_is_the_same_in_every_unit(units, same):
+    """The first of each is SI."""
+    assert units.keys() == same.keys()
+    si, *_ = same.values()
+    assert {name: number * units[name] for name, number in same.items()} == pytest.approx(dict.fromkeys(same, si))
 
 
 def test_a_pair_is_the_same_in_either_order(tmp_path):
