@@ -12,8 +12,9 @@ somewhere, and that observable would then make most of the sum. With n = 3, m = 
 perfect model shows 1.5 times the floor (root mean square) by s_meas, 1.15 times by s. Predictions are fresh
 simulations, never the emulator.
 
-A single measured replicate does not tell its scatter. Its variance is that of the simulated pours of the final model,
-of the mean of k of them if it is one, and of its instrument, s_after^2/k + u^2 with the stated u.
+Of replicates that are means of k pours each, the variance is s^2/k, and k s_meas^2 goes into s. A single measured
+replicate does not tell its scatter. Its variance is that of the simulated pours of the final model and of its
+instrument, s_after^2/k + u^2 with the stated u.
 """
 
 from __future__ import annotations
@@ -74,8 +75,12 @@ class MeasuredReplicates:
 
     @property
     def share(self) -> float:
-        """Variance of a replicate, without that, as a share of the variance that its scatter is taken from."""
-        return 1.0 / self.mean_of if self.alone else 1.0
+        """Variance of a replicate, without that, as a share of a pour's."""
+        return 1.0 / self.mean_of
+
+    def deviation_of_a_pour(self, poured: FloatArray) -> FloatArray:
+        """Standard deviation of a pour, pooled over these replicates and simulated pours (m, d); (d,)."""
+        return pooled_deviation(math.sqrt(self.mean_of) * self.values, poured)
 
 
 @dataclass(frozen=True)
@@ -145,7 +150,8 @@ class _Entry:
         data = condition.measured
         measured, before, after = (values[:, column] for values in (data.values, condition.before, condition.after))
         instrument = float(data.instrument[column])
-        deviation = math.sqrt(data.share * float(pooled_deviation(measured, after)) ** 2 + instrument**2)
+        of_a_pour = float(data.deviation_of_a_pour(condition.after)[column])
+        deviation = math.sqrt(data.share * of_a_pour**2 + instrument**2)
         noise = deviation**2 if data.alone else _square_error(measured)
         draws = [
             values[generator.integers(0, len(values), size=(samples, len(values)))].mean(axis=1)

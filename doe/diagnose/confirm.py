@@ -3,11 +3,11 @@
 The seeds are those of no pour that taught a model. Held-out data never choose: they report the error, and they may take
 an answer back. The farthest summary of the final model over all held-out conditions is
 
-    |t| = max |measured − poured| / (s √(1/r + 1/m))
+    |t| = max |measured − poured| / (s √(1/(k r) + 1/m))
 
-with r measured and m fresh pours, s the deviation of a pour pooled over both and f = r + m − 2 degrees of freedom. For
-a single measured replicate, the mean of k pours, s is that of the fresh pours alone and the stated uncertainty u of its
-instrument comes in: below the bar stands √(s² (1/k + 1/m) + u²), with f (1 + u²/(s² (1/k + 1/m)))² degrees of freedom
+with r measured replicates, each the mean of k pours, and m fresh pours, s the deviation of a pour pooled over both and
+f = r + m − 2 degrees of freedom. For a single one s is that of the fresh pours alone, and the uncertainty u stated of
+its instrument comes in: below the bar stands √(s² (1/k + 1/m) + u²), with f (1 + u²/(s² (1/k + 1/m)))² of freedom
 (Welch and Satterthwaite, doi 10.2307/3002019). Bonferroni's p = (number of summaries) P(|t_f| ≥ |t|) below
 ``CONTRADICTED`` contradicts it. That is strict because the error of the fit is not in s, and summary by summary
 because what is missing shows in what it acts on, not evenly over all.
@@ -34,7 +34,7 @@ from doe.holdout import MeasuredReplicates
 from doe.measurement.features import coarse_map
 from doe.measurement.measurement import Condition
 from doe.measurement.piles import PileSurface
-from doe.measurement.residual_map import ResidualMap, height_difference, pooled_deviation
+from doe.measurement.residual_map import ResidualMap, height_difference
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -111,7 +111,7 @@ def held_out(label: str, data: Sequence[MeasuredReplicates], poured: Sequence[Fl
         if r < 1 or m < 2:
             continue
         floor = CONSTANT_FLOOR * np.abs(np.concatenate([one.values, block])).max(axis=0)
-        spread = np.maximum(pooled_deviation(one.values, block), floor)
+        spread = np.maximum(one.deviation_of_a_pour(block), floor)
         varies = spread > 0.0
         if not varies.any():
             continue

@@ -157,6 +157,27 @@ def test_a_single_mean_is_covered_within_its_share_of_the_scatter_and_its_instru
     assert holdout_errors([one])[0].coverage_after == covered
 
 
+def test_means_of_several_pours_scatter_as_their_number_says():
+    """By hand: means 1 and 3 of four pours have squares of 2 about theirs, 8 of single ones; 1 and 3 are single pours:
+    s² = (8 + 2)/2 = 5, that of a mean 5/4. Pours of 2 ± 1: 6.3138 √(2 (1/4 + 1/2)) = 7.733 hold a mean of four.
+    """
+    measured, pours = np.array([[1.0], [3.0]]), np.array([[1.0], [3.0]])
+    row = holdout_errors([compared(("x",), measured, pours + 10.0, pours, mean_of=4)])[-1]
+    assert row.before == pytest.approx(10.0 / np.sqrt(5.0 / 4.0))
+    far = compared(("x",), np.array([[9.7], [9.8]]), pours, pours, mean_of=4)
+    assert holdout_errors([far])[0].coverage_after == 0.5
+
+
+def test_means_of_several_pours_are_covered_as_often_as_single_ones():
+    rng = np.random.default_rng(8)
+    found = []
+    for seed in range(300):
+        means, pours = rng.standard_normal((3, 10, 2)).mean(axis=1), rng.standard_normal((20, 2))
+        found.append(holdout_errors([compared(("a", "b"), means, pours, pours, mean_of=10)], samples=2, seed=seed)[-1])
+    # 600 groups of three that share their simulated mean.
+    assert np.mean([row.coverage_after for row in found]) == pytest.approx(0.9, abs=0.04)
+
+
 def test_what_never_varies_counts_in_its_own_unit():
     same = np.full((2, 1), 2.0)
     row = holdout_errors([compared(("x",), same, same + 3.0, same)])[-1]

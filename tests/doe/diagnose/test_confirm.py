@@ -109,6 +109,43 @@ def test_a_single_held_out_reading_is_held_against_its_instrument_and_the_scatte
     assert plain.p == pytest.approx(2.0 * stats.t.sf(6.0 / np.sqrt(1.2), 4))
 
 
+@pytest.mark.parametrize(("replicates", "mean_of"), [(3, 1), (3, 10), (2, 4)])
+def test_a_right_model_is_contradicted_as_often_by_means_of_several_pours(replicates, mean_of):
+    rng = np.random.default_rng(6)
+    below = 0
+    for _ in range(1000):
+        values = rng.standard_normal((replicates, 1)) / np.sqrt(mean_of)
+        found = held_out(
+            "base", [MeasuredReplicates("mean", ("mass",), values, np.zeros(1), mean_of)], [rng.standard_normal((8, 1))]
+        )
+        assert found is not None
+        below += found.p < 0.1
+    # A tenth is below p = 0.1: three binomial standard errors.
+    assert below / 1000 == pytest.approx(0.1, abs=0.03)
+
+
+def test_several_readings_by_hand():
+    """Means 4 and 6 of two pours each, squares 2 · 2, and pours 0 and 2, squares 2: s² = 6/2, 3 (1/4 + 1/2) = 9/4."""
+    one = MeasuredReplicates("mean", ("mass",), np.array([[4.0], [6.0]]), np.zeros(1), 2)
+    found = held_out("base", [one], [np.array([[0.0], [2.0]])])
+    assert found is not None
+    assert found.farthest == pytest.approx(4.0 / 1.5)
+    assert found.p == pytest.approx(2.0 * stats.t.sf(4.0 / 1.5, 2))
+
+
+def test_the_p_of_the_farthest_counts_all_that_were_asked():
+    """Three numbers of two conditions, equal pours: the farthest by t with four degrees of freedom, times three."""
+    pours = np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])
+    near = MeasuredReplicates("near", ("a", "b"), pours + np.array([1.0, -2.0]), np.zeros(2))
+    far = MeasuredReplicates("far", ("c",), pours[:, :1] + 3.0, np.zeros(1))
+    for order in ([near, far], [far, near]):
+        found = held_out("base", order, [pours[:, : len(one.summaries)] for one in order])
+        assert found is not None
+        assert (found.condition, found.summary) == ("far", "c")
+        assert found.farthest == pytest.approx(3.0 / np.sqrt(2.0 / 3.0))
+        assert found.p == pytest.approx(3.0 * 2.0 * stats.t.sf(3.0 / np.sqrt(2.0 / 3.0), 4))
+
+
 def test_a_right_model_is_seldom_contradicted_by_single_readings():
     """A tenth of the answers is below p = 0.1, for readings with an instrument of 0, 1 and 5 deviations of a pour."""
     rng = np.random.default_rng(5)
