@@ -13,7 +13,7 @@ from statsmodels.stats.anova import anova_lm
 
 from doe.analysis.canonical import canonical_analysis
 from doe.analysis.steepest_ascent import Region
-from doe.analysis.surface import fit_surface, second_order_terms
+from doe.analysis.surface import Blocks, fit_surface, second_order_terms
 from doe.analysis.surface_anova import analyse_surface
 from doe.designs import box_behnken
 from doe.errors import StatisticsError
@@ -265,3 +265,25 @@ def test_a_run_that_the_fit_cannot_do_without_has_no_left_out_residual(recwarn):
     assert np.isnan(anova.r_squared_predicted_by_row)
     assert not anova.better_than_noise
     assert not [warning for warning in recwarn if issubclass(warning.category, RuntimeWarning)]
+
+
+def test_blocks_of_unequal_size_are_those_of_statsmodels():
+    """Of the blocks before the terms (Type I), of the terms beside all (Type III), effects that sum to zero."""
+    rng = np.random.default_rng(6)
+    design = np.repeat(DESIGN, 2, axis=0)
+    block = rng.integers(3, size=len(design))
+    block[:12] = 0
+    y = 20 + 2 * design[:, 0] + np.array([0.0, 3.0, -1.0])[block] + rng.standard_normal(len(design))
+    region = Region(("A", "B", "D"), np.zeros(3), np.ones(3), ())
+    surface = fit_surface(design, y[:, None], region, ("A", "B", "D"), Blocks(("x", "y", "z"), block[:, None]))
+    found = analyse_surface(surface)
+    frame = pd.DataFrame(design, columns=["A", "B", "D"]).assign(y=y, block=block)
+    fit = smf.ols("y ~ C(block, Sum) + A + B + D", frame).fit()
+    first, partial = anova_lm(fit, typ=1), anova_lm(fit, typ=3)
+    assert found.row("block").sum_of_squares == pytest.approx(first.loc["C(block, Sum)", "sum_sq"])
+    for name in ("A", "B", "D"):
+        assert found.row(name).p == pytest.approx(partial.loc[name, "PR(>F)"])
+    effects = [fit.params[f"C(block, Sum)[S.{k}]"] for k in (0, 1)]
+    assert surface.block_effects == pytest.approx([*effects, -sum(effects)])
+    assert surface.coefficients[0] == pytest.approx(fit.params["Intercept"])
+    assert surface.predicted == pytest.approx(fit.fittedvalues)

@@ -25,6 +25,10 @@ def test_a_p_at_its_level_is_no_fault_and_a_bound_says_what_it_says(clean):
     assert "0.0378 from F" in others.how
     unknown = replace(at_level, f=(), error_df=2)
     assert [f.status for f in significant(replace(clean, screening=unknown))] == ["reproduced exactly"] * 2
+    # F5 is named at 0.01: 0.010 may stand for less, 0.011 does not.
+    for text, status in (("0.010", "reproduced exactly"), ("0.011", "differs")):
+        named = replace(screening, p=at(screening.p, 4, printed(text)))
+        assert significant(replace(clean, screening=named))[0].status == status
     bound = replace(unknown, p=at(screening.p, 3, printed("<0.05")), level_of_others=0.01)
     assert [f.status for f in significant(replace(clean, screening=bound))] == ["reproduced exactly"] * 2
 

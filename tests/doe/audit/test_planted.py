@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from doe.audit import audit_study
 from doe.audit.printed import printed
 from doe.audit.study import DesignSteps
+from doe.audit.surface_refit import refit
 from tests.doe.audit.made_up import clean_study, shown
 
 
@@ -272,6 +274,18 @@ def test_verification_far_from_the_model_is_remarked(clean):
     (remark,) = audit_study(replace(clean, verified=verified)).remarks
     assert remark.check == "runs against the model"
     assert "gave 36.10" in remark.text
+
+
+@pytest.mark.parametrize(("share", "remarks"), [(0.95, 0), (1.05, 1), (-1.05, 1)])
+def test_a_mean_of_three_runs_is_held_against_its_own_prediction_interval(clean, share, remarks):
+    """t √(s²/3 + SE²) about the model at the optimum; of a single run it would be t √(s² + SE²)."""
+    surface = refit(clean.surface)
+    point = surface.region.coded([one.value for one in clean.optimum.values])
+    half = stats.t.ppf(0.975, surface.df_residual) * np.sqrt(surface.mse / 3 + surface.standard_error(point) ** 2)
+    runs = shown([float(surface.predict(point)) + share * half] * 3, 4)
+    verified = replace(clean.verified, responses=runs, mean=None, relative_error_percent=None, p_two_sample=None)
+    found = audit_study(replace(clean, verified=verified)).remarks
+    assert [one.check for one in found].count("runs against the model") == remarks
 
 
 def test_an_ascent_step_far_from_the_model_is_remarked(clean):

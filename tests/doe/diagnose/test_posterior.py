@@ -49,13 +49,13 @@ SURE = 1e5
 BASE = 24
 
 
-def emulator(shifts, freedom=200, pours=12, sensitivity=None, variance=25.0, ways=None):
+def emulator(shifts, freedom=200, pours=12, sensitivity=None, variance=25.0, ways=None, moved=SURE):
     """Of features of unit noise, with the base model at zero and effects shifting by ``shifts`` at amplitude 1."""
     m = len(shifts)
     rows = [np.zeros(2 + 2 * m)] * BASE
     z = [np.zeros(SIZE)] * BASE
     slope = np.zeros(SIZE) if sensitivity is None else sensitivity
-    for k, sign in enumerate((-SURE, SURE)):
+    for k, sign in enumerate((-moved, moved)):
         rows[k] = sign * np.eye(2 + 2 * m)[1]
         z[k] = sign * slope
     for way, shift in enumerate(shifts.values()):
@@ -98,6 +98,20 @@ def test_without_effects_it_is_the_ratio_of_two_densities():
 
     def density(more):
         scale = np.eye(SIZE) * (1.0 / 6.0 + 1.0 / 24.0 + more) + np.outer(slope, slope)
+        return t_of(z, scale, 2 * 30)
+
+    nothing, outside = NOTHING * density(0.0), OUTSIDE * np.mean([density(s**2) for s in SPREADS])
+    assert found.nothing == pytest.approx(nothing / (nothing + outside), rel=1e-6)
+
+
+def test_what_is_not_known_of_a_slope_is_noise():
+    """By two pours, a deviation up and one down: variance 1/2 of the slope, in every feature."""
+    rng = np.random.default_rng(1)
+    slope, z = rng.standard_normal(SIZE), rng.standard_normal(SIZE)
+    found = judged(emulator({}, freedom=30, sensitivity=slope, moved=1.0), z)
+
+    def density(more):
+        scale = np.eye(SIZE) * (1.0 / 6.0 + 1.0 / 24.0 + 1.0 / 2.0 + more) + np.outer(slope, slope)
         return t_of(z, scale, 2 * 30)
 
     nothing, outside = NOTHING * density(0.0), OUTSIDE * np.mean([density(s**2) for s in SPREADS])
