@@ -36,6 +36,7 @@ from doe.diagnose.posterior import (
     multiples,
     posterior,
 )
+from doe.diagnose.posterior import _spread_of as spread_of
 from doe.errors import StatisticsError
 from doe.validation.cross_validation import NULLS, PlantedTruth, Teaching, cross_validated
 from doe.validation.limit import RISKS, DataKind
@@ -254,6 +255,35 @@ def test_two_effects_at_once_are_told_where_none_alone_explains():
     alone = judged(taught, 3.0 * unit(0, 8), pairs=True)
     assert alone.best[0] == "push"
     assert alone.best[1] > 0.9
+
+
+def test_pairs_share_their_prior_and_single_effects_the_rest():
+    """Three of each, at temperature one: odds are those of the priors times those of the evidence."""
+    taught = emulator({"push": 4.0 * unit(0, 8), "pull": 4.0 * unit(3), "turn": 4.0 * unit(5)}, variance=1.0)
+    found = judged(taught, 2.0 * unit(0, 8) + 1.5 * unit(3) + 0.5 * unit(5), pairs=True)
+    assert len(found.effects) == 6
+    priors = {name: PAIRS / 3 if "+" in name else (1.0 - NOTHING - OUTSIDE - PAIRS) / 3 for name in found.effects}
+    weights = {name: prior * math.exp(found.fits[name].log_evidence) for name, prior in priors.items()}
+    weights["base"] = NOTHING * math.exp(found.fits["base"].log_evidence)
+    odds = {name: found.effects.get(name, found.nothing) / weight for name, weight in weights.items()}
+    assert list(odds.values()) == pytest.approx([odds["base"]] * 7)
+
+
+@pytest.mark.parametrize(("size", "weighed"), [(0.8, False), (1.5, True)])
+def test_an_effect_that_nobody_could_see_is_no_second_one(size, weighed):
+    """At 1.6 times its reference amplitude it shifts means of six pours by √6 · 1.6 · size: 3.1 or 5.9, least is 4."""
+    taught = emulator({"push": 4.0 * unit(0, 8), "faint": size * unit(3)}, variance=1.0)
+    found = judged(taught, 3.0 * unit(0, 8) + 0.5 * unit(3), pairs=True)
+    assert ("push+faint" in found.effects) == weighed
+
+
+def test_an_amplitude_s_interval_is_that_of_its_weights():
+    """Nodes 0.1 apart with the weights of a normal number of deviation 0.7 about 1; half of a step is 0.05."""
+    nodes = np.random.default_rng(0).permutation(np.arange(-4.0, 6.05, 0.1))
+    weights = stats.norm.pdf(nodes, 1.0, 0.7)
+    mean, low, high = spread_of(nodes, weights / weights.sum())
+    assert mean == pytest.approx(1.0, abs=1e-6)
+    assert (low, high) == pytest.approx(stats.norm.ppf([0.025, 0.975], 1.0, 0.7), abs=5e-3)
 
 
 def test_two_effects_are_weighed_where_the_best_one_does_not_fit():
