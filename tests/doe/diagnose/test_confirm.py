@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from doe.diagnose.confirm import CONTRADICTED, Confirmed, confirming, held_out, residual_maps
-from doe.diagnose.result import CalibratedModel
+from doe.declared.model import CalibratedParameter, CandidateEffect, Declared
+from doe.diagnose.confirm import CONTRADICTED, Confirmed, confirming, held_out, model_of, residual_maps
+from doe.diagnose.posterior import Fit
+from doe.diagnose.result import Amplitude, CalibratedModel
 from doe.holdout import MeasuredReplicates
 from doe.measurement import load_measurement
 from doe.measurement.piles import PileSurface
@@ -76,6 +78,17 @@ def test_without_scans_there_is_no_map():
     condition = replace(load_measurement(Path(measurement_folder("trefoil_1"))).fit[0], surfaces={})
     model = Confirmed(CalibratedModel(()), (), 0)
     assert residual_maps([condition], model, model, SimpleNamespace(records=None), 3) == ()
+
+
+def test_a_model_is_poured_within_its_ranges():
+    """θ = 3 deviations of 0.2 above 0.5 is beyond 1; so are amplitudes beyond what the literature supports."""
+    effects = (CandidateEffect("air_drag", (0.0,), (2.0,)), CandidateEffect("plate_tilt", (-1.5, -1.5), (1.5, 1.5)))
+    declared = Declared((CalibratedParameter("friction", 0.0, 1.0, 0.5, 0.2),), effects, ())
+    values = (("plate_tilt", 0, -1.8), ("plate_tilt", 1, 0.7), ("air_drag", 0, 2.6))
+    amplitudes = tuple(Amplitude(name, index, value, value, value, False) for name, index, value in values)
+    none = np.zeros(0)
+    fit = Fit("", amplitudes, np.array([3.0]), np.eye(1), none, none, none, 0.0, 0.5)
+    assert model_of(fit, declared) == CalibratedModel((1.0,), (("plate_tilt", (-1.5, 0.7)), ("air_drag", (2.0,))))
 
 
 def test_the_points_that_confirm_are_those_that_were_poured():

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from doe.declared.model import CalibratedParameter, Declared, DeclaredCondition
+from doe.diagnose.compared_features import MeasuredFeatures, weighed
+from doe.diagnose.emulator import Lessons, Way
 from doe.diagnose.posterior import FITS, Fit, Posterior
 from doe.diagnose.result import NO_EFFECT, UNEXPLAINED
-from doe.diagnose.verdict import NOTHING_AT_ONCE, NOTHING_FROM, answer
+from doe.diagnose.verdict import NOTHING_AT_ONCE, NOTHING_FROM, answer, verdict_of
 
 
 def posterior(nothing, outside, effects, badly=()):
@@ -58,3 +61,38 @@ def test_what_is_half_sure_that_nothing_is_missing_asks_for_more(nothing, kind):
 
 def test_the_reason_is_told():
     assert "as far off a or b as these" in answer(posterior(0.01, 0.01, {"a": 0.6, "b": 0.38}, "ab"))[2]
+
+
+def test_the_tables_of_a_verdict_by_closed_form():
+    """Unit noise, one slope and one effect, six pours of data: a parameter two deviations up, "lean" three too high."""
+    rng = np.random.default_rng(0)
+    names, way = ("height", "width", "area", "lean"), np.repeat([-1, 0], 200)
+    theta = np.where(np.arange(400) % 2, 1.0, -1.0)[:, None]
+    block = rng.standard_normal((400, 4)) + theta * np.eye(4)[1]
+    block[way == 0] += np.eye(4)[0]
+    taught = Lessons(theta, way, (way == 0).astype(float), np.ones(400, bool), (block,))
+    # Of the mean of these replicates each feature is what it is said to be.
+    values = rng.standard_normal((6, 4))
+    values += np.array([0.0, 2.0, 0.0, 3.0]) - values.mean(axis=0)
+    data = MeasuredFeatures("low", "scan", names, values, np.zeros(4), scalars=1)
+    compared = weighed(taught, (Way("push", "push"),), [data])
+    parameter = CalibratedParameter("friction", 0.0, 1.0, 0.3, 0.05)
+    declared = Declared((parameter,), (), (DeclaredCondition("low", names),))
+    found = verdict_of(compared, declared, (200,), followed_up=False)
+
+    # Far features are drawn in, 2 asinh(x/2); the mean of six has a variance of r/6, and θ ~ N(0, 1) beforehand.
+    noise = compared.data.scatter / 6.0
+    (row,) = found.parameters
+    assert (row.mean, row.sd) == (0.3, 0.05)
+    assert row.before_sd == pytest.approx(0.05 * np.sqrt(noise / (1.0 + noise)), rel=0.1)
+    assert row.before == pytest.approx(0.3 + 0.05 * 2.0 * np.arcsinh(1.0) / (1.0 + noise), abs=0.05 * 0.25)
+    residuals = {one.feature: one for one in found.residuals}
+    assert residuals["lean"].z_before == pytest.approx(2.0 * np.arcsinh(1.5) / np.sqrt(noise), rel=0.2)
+    assert residuals["lean"].measured - residuals["lean"].before == pytest.approx(3.0, rel=0.2)
+    assert abs(residuals["area"].z_before) < 1.0
+    (place,) = found.where
+    assert (place.condition, place.share, place.feature) == ("low", 1.0, "lean")
+    (effect,) = found.effects
+    # A shift by one deviation; the means of 200 pours leave 0.1 of it.
+    assert effect.strength == pytest.approx(1.0 / np.sqrt(noise), rel=0.25)
+    assert effect.pours == 200
