@@ -36,6 +36,7 @@ OPTIONAL = (
     ("Dask", "distributed", "dask", "--scheduler (pours on many machines)"),
     ("meshio", "meshio", "paraview", "export --to paraview"),
     ("Matplotlib", "matplotlib", "paper", "figures/ of a report (SVG, PDF)"),
+    ("NiceGUI", "nicegui", "tables", "tables and pictures to edit in a window of their own, from the page"),
 )
 """Name, module, extra of this distribution, what does not work without."""
 PEERS = (
