@@ -34,8 +34,9 @@ from solver import EFFECTS, ParameterError, Scene, parameters, pour_rig, value, 
 FloatArray = npt.NDArray[np.float64]
 PoursIn = Callable[[Sequence[Condition]], ModelPours]
 
-BASE_POURS, POURS = 12, 4
-"""Pours of the base model, and of every direction of an effect that is left, in each set-up of the candidates."""
+BASE_POURS, POURS, TAUGHT = 12, 4, 14
+"""Pours of the base model, and of every direction of an effect that is left, in each set-up of the candidates; and of a
+direction when the data of the chosen one are weighed (six, and a look of eight, at least)."""
 INTERVAL = 2.0 * 1.96
 """Standard deviations in a 95 % interval."""
 
@@ -152,8 +153,9 @@ def _item(
         slope = emulator.squashes[0].slope(emulator.squashes[0].centre)
         shared = emulator.whitening @ (axis * slope).T
     expected = {label: emulator.at(_rows(emulator, training, found, label)) for label in labels}
-    # How well a regression of few pours knows an answer is no property of it that would give it away.
+    # How well a regression of few pours knows an answer is no property of it that would give it away, nor does it stay.
     noise = np.mean([variance[0] for _, variance in expected.values()], axis=0) + emulator.slope_variance
+    noise *= POURS / TAUGHT
     predictions, slopes = {}, emulator.slopes
     for label, ((mean, *beside), _) in expected.items():
         fit = found.fits[label]
