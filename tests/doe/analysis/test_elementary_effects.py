@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy import stats
+from statsmodels.stats.multitest import multipletests
 
 from doe.analysis.elementary_effects import elementary_effects
 from doe.designs import DESIGNS, DesignOptions, morris
@@ -77,6 +78,21 @@ def test_a_square_about_the_middle_has_mu_star_but_no_mu(design):
     assert abs(found.mu) < found.mu_star
     assert found.mu_star_half_width == 0
     assert found.p == pytest.approx(stats.ttest_1samp(found.effects, 0).pvalue)
+
+
+def test_tests_and_intervals_are_those_of_other_programs(design):
+    """Of mu by Student's t, all at once by Holm; of mu* about the sizes of the effects, signs left out."""
+    u = (design + 1) / 2
+    y = u @ [1.0, 0.4, 0.2, 0.0, 0.0] + u[:, 0] * u[:, 1] + np.random.default_rng(4).normal(0, 0.3, len(u))
+    found = by_name(design, y)
+    own = [found[name] for name in NAMES]
+    assert [one.p for one in own] == pytest.approx([stats.ttest_1samp(one.effects, 0).pvalue for one in own])
+    assert [one.p_holm for one in own] == pytest.approx(multipletests([one.p for one in own], method="holm")[1])
+    for one in own:
+        low, high = stats.ttest_1samp(np.abs(one.effects), 0).confidence_interval(0.95)
+        assert (one.mu_star - one.mu_star_half_width, one.mu_star + one.mu_star_half_width) == pytest.approx(
+            (low, high)
+        )
 
 
 def test_a_lost_run_takes_the_two_steps_beside_it(design):

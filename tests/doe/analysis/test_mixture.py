@@ -67,6 +67,10 @@ def test_errors_and_shares_explained_are_those_of_another_program():
     assert found.p[4:] == pytest.approx(theirs.pvalues[4:])
     assert np.isnan(found.p[:4]).all()
     assert found.r_squared == pytest.approx(theirs.rsquared)
+    assert found.r_squared_adjusted == pytest.approx(theirs.rsquared_adj)
+    for blend in (found.highest, found.lowest):
+        there = theirs.get_prediction(mixture_matrix(blend.amounts[None], mixture_terms("ABCD", "quadratic")))
+        assert (blend.predicted, blend.standard_error) == pytest.approx((there.predicted_mean[0], there.se_mean[0]))
     press = ((theirs.resid / (1 - theirs.get_influence().hat_matrix_diag)) ** 2).sum()
     assert found.r_squared_predicted == pytest.approx(1 - press / ((values - values.mean()) ** 2).sum())
     assert found.rows[0].f == pytest.approx(theirs.fvalue)

@@ -4,8 +4,15 @@ import json
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from doe.analysis.optimum import compatible_share, find_compromise, find_optimum, solution_range
+from doe.analysis.optimum import (
+    bootstrap_coefficients,
+    compatible_share,
+    find_compromise,
+    find_optimum,
+    solution_range,
+)
 from doe.analysis.steepest_ascent import Region
 from doe.analysis.surface import fit_surface, second_order_terms
 from doe.designs import box_behnken
@@ -108,6 +115,76 @@ def test_single_runs_fall_back_to_residuals_and_the_seed_repeats_the_result():
     assert one.resampling == "residuals"
     assert find_optimum(surface(0.5, 2), 25.0, [50.0, 0.6, 0.6]).resampling == "replicates within points"
     assert np.array_equal(one.bootstrap_points, again.bootstrap_points)
+
+
+def test_replicates_that_are_drawn_scatter_as_their_points_do():
+    """Var(b) = A diag(s²) Aᵀ with A = (XᵀX)⁻¹ Xᵀ and s² of each point with n − 1: 4000 refits leave 2 % of it."""
+    model = surface(0.5, 3)
+    drawn, method = bootstrap_coefficients(model, 4000, seed=1)
+    assert method == "replicates within points"
+    a = np.linalg.pinv(model.model_matrix)
+    of_point = [model.observed[model.point_of_run == k].var(ddof=1) for k in range(13)]
+    expected = (a**2) @ np.array(of_point)[model.point_of_run]
+    assert drawn.var(axis=0) == pytest.approx(expected, rel=0.1)
+    # Means of the points stay, and with them what is fitted to those; four standard errors.
+    assert (np.abs(drawn.mean(axis=0) - model.coefficients) < 4 * np.sqrt(expected / 4000)).all()
+
+
+def test_residuals_that_are_drawn_have_the_spread_of_errors_and_no_mean():
+    """Var(b) = v (XᵀX)⁻¹, v the variance of e/√(1 − h): e alone is too small by the leverage."""
+    rng = np.random.default_rng(3)
+    points = np.append(rng.uniform(-0.3, 0.3, (8, 1)), [[0.6], [0.6], [1.0]], axis=0)
+    box = Region(("G",), np.array([50.0]), np.array([10.0]), ())
+    bent = 24 + 2 * points + 3 * points**2 + 0.2 * rng.standard_normal((11, 1))
+    model = fit_surface(points, bent, box, ("G",))
+    drawn, method = bootstrap_coefficients(model, 4000, seed=1)
+    assert method == "residuals"
+    scaled = (model.observed - model.predicted) / np.sqrt(1 - model.leverage)
+    assert abs(scaled.mean()) > 0.05 * scaled.std()
+    assert scaled.var() > 1.2 * (model.observed - model.predicted).var()
+    own = model.included
+    expected = scaled.var() * np.diag(model.information_inverse)[own]
+    assert drawn[:, own].var(axis=0) == pytest.approx(expected, rel=0.1)
+    off = np.abs(drawn[:, own].mean(axis=0) - model.coefficients[own])
+    assert (off < 4 * np.sqrt(expected / 4000)).all()
+
+
+def of_one_factor(sigma=0.5):
+    """24 + 2 G' at five levels, three runs each."""
+    points = np.linspace(-1, 1, 5)[:, None]
+    values = 24 + 2 * points + sigma * np.random.default_rng(5).standard_normal((5, 3))
+    return fit_surface(points, values, Region(("G",), np.array([50.0]), np.array([10.0]), ()), ("G",))
+
+
+def test_the_interval_of_the_point_holds_95_percent_of_the_refits():
+    found = find_optimum(of_one_factor(), 24.5, [50.0], refits=1000)
+    outside = [(found.bootstrap_points < found.point_low).sum(), (found.bootstrap_points > found.point_high).sum()]
+    assert outside == [25, 25]
+
+
+@pytest.mark.parametrize("error", [0.0, 0.4])
+def test_the_compatible_share_is_that_of_points_whose_interval_holds_the_target(error):
+    """Of 20 000 points drawn evenly, with t of the surface's degrees of freedom."""
+    model = surface(0.5)
+    points = np.random.default_rng(2).uniform(-1, 1, (20_000, 3))
+    margin = stats.t.ppf(0.975, model.df_residual) * np.sqrt(model.standard_error(points) ** 2 + error**2)
+    share = (np.abs(model.predict(points) - 25.0) <= margin).mean()
+    assert compatible_share(model, 25.0, error) == pytest.approx(share, abs=0.012)
+
+
+def test_a_compromise_counts_misses_by_what_is_known_of_both_sides():
+    """One response with two targets, 24.2 ± 0.3 and 25 ± 0.1: s² = sd²/n + SE² of the model at the centre."""
+    model = of_one_factor()
+    targets = [Target("a", 24.2, 0.9, 9, margin=1.0), Target("b", 25.0, 0.3, 9, margin=0.5)]
+    found = find_compromise([model, model], targets, [50.0])
+    s2 = np.array([0.3, 0.1]) ** 2 + model.standard_error(np.zeros(1)) ** 2
+    best = (24.2 / s2[0] + 25.0 / s2[1]) / (1 / s2).sum()
+    # A half-width off the reference costs 0.001 of a squared standard error.
+    assert found.predicted == pytest.approx([best, best], abs=2e-3)
+    missed = found.predicted - [24.2, 25.0]
+    assert found.standardised == pytest.approx(missed / np.sqrt(s2))
+    assert found.misfit == pytest.approx((missed**2 / s2).sum())
+    assert found.desirability == pytest.approx(1.0 - np.abs(missed) / [1.0, 0.5])
 
 
 def test_a_surface_of_noise_is_no_calibration():
