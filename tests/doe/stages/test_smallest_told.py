@@ -2,16 +2,19 @@
 
 import dataclasses
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy import stats
 
 from doe.analysis.pilot import Noise
+from doe.analysis.screening import analyse_screening
 from doe.analysis.steepest_ascent import Region
 from doe.analysis.surface import fit_surface
 from doe.analysis.verification import verify
-from doe.stages.ascent import _approach, _walk
+from doe.designs import plackett_burman
+from doe.stages.ascent import _approach, _first_order, _walk
 from doe.stages.surface import _smallest_main_effect
 from doe.stages.verification import _smallest_difference
 from doe.studies.profile import Profile
@@ -37,6 +40,17 @@ def test_a_step_is_known_by_the_pilot_s_scatter_of_its_valid_pours():
     assert found.sd == pytest.approx([math.sqrt(8 / 3), math.sqrt(50.0), np.nan, np.nan], nan_ok=True)
     assert found.standard_error[:3] == pytest.approx([1.5 / 2, 1.5 / math.sqrt(2), 1.5])
     assert found.relative_error_percent == pytest.approx([12.0, 0.0, 4.0, np.nan], nan_ok=True)
+
+
+def test_the_centre_of_a_screening_is_known_by_all_of_its_runs():
+    """Twelve rows of two pours: 1.5/√24, beside 1.2/√9 of the target; the effects are those of the target."""
+    design, names = plackett_burman(12)[:, :5], tuple("ABCDE")
+    values = 20 + design @ [2.0, 0, -1, 0, 0] + np.array([[0.1], [-0.1]])
+    screened = SimpleNamespace(target_analysis=analyse_screening(design, names, values.T, ()), further_analyses={})
+    model = _first_order(screened, [SimpleNamespace(name=name) for name in "CA"], TARGET, NOISE)
+    assert (model.mean, model.goal, model.weight) == (pytest.approx(20.0), 25.0, 1.0)
+    assert model.effects == pytest.approx([-2.0, 4.0])
+    assert model.spread == pytest.approx(math.hypot(1.2 / 3, 1.5 / math.sqrt(24)))
 
 
 def test_two_steps_that_differ_so_much_are_told_apart_by_80_percent():
