@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from doe.diagnose.compared_features import BIAS_ERROR, Instrument, MeasuredFeatures, weighed
-from doe.diagnose.emulator import Lessons, Way
+from doe.diagnose.emulator import SQUASH, Lessons, Way
 from doe.errors import StatisticsError
 
 NAMES = ("height", "width", "area", "lean")
@@ -62,6 +63,17 @@ def test_a_laboratory_that_scatters_more_is_believed_less():
     assert calm.data.scatter < 2.0
     assert loose.data.scatter > 5.0
     assert loose.posterior.effects["push"] < calm.posterior.effects["push"]
+
+
+def test_the_scatter_of_the_data_is_told_on_average():
+    """Twice the deviation of a pour, of which far features are drawn in alike on both sides; 40 sets of 20 numbers."""
+    taught, rng = lessons(np.random.default_rng(0), number=200), np.random.default_rng(6)
+    taught.blocks[0][200:, 0] -= 4.0  # an effect that does nothing
+    found = [weighed(taught, WAYS, [data(2.0 * rng.standard_normal((6, D)))]).data.scatter for _ in range(40)]
+    g = np.linspace(-8.0, 8.0, 4001)
+    far, near = (((SQUASH * np.arcsinh(v * g / SQUASH)) ** 2 @ stats.norm.pdf(g)) for v in (2.0, 1.0))
+    # √(2/800) leaves 5 % of it, and what is known of Σ somewhat less.
+    assert np.mean(found) == pytest.approx(far / near, rel=0.1)
 
 
 def test_more_pours_in_a_condition_count_for_more():

@@ -36,6 +36,19 @@ def test_the_chance_is_that_of_the_likelihood_ratio(gap, pours, own):
     assert found == pytest.approx(expected, abs=3.0 * math.sqrt(expected * (1.0 - expected) / (2 * DRAWS)))
 
 
+def test_answers_of_one_mean_are_told_apart_by_how_sure_they_are():
+    """Both at 0, deviations s and 30 s: the log odds of the narrow one are T (ln 30 − x² (1 − 1/900)/(2 s²))."""
+    zero, narrow, wide = np.zeros(1), 1e-6 * np.eye(1), (900.0 / 6.0 - 1.0 / 6.0) * np.eye(1)
+    one = CandidateExperiment("x", {"a": Prediction(zero, narrow), "b": Prediction(zero, wide)}, np.eye(1))
+    sure, scale = math.log(SURE / (1.0 - SURE)) / TEMPERATURE, 0.5 * (1.0 - 1.0 / 900.0)
+    below = stats.chi2.cdf((math.log(30.0) - sure) / scale, 1)
+    above = stats.chi2.sf((math.log(30.0) + sure) / scale / 900.0, 1)
+    # Three standard errors of shares of DRAWS made-up data sets each.
+    found = chance_of_an_answer(one, WEIGHTS, 6)
+    assert found == pytest.approx(0.5 * (below + above), abs=3.0 * 0.5 * math.sqrt(0.25 / DRAWS + 0.1 / DRAWS))
+    assert 0.4 < below < 0.7 < above
+
+
 def test_a_likely_answer_needs_less():
     near = chance_of_an_answer(item(1.0), {"a": 0.85, "b": 0.15}, 6)
     assert near > chance_of_an_answer(item(1.0), WEIGHTS, 6)

@@ -19,6 +19,7 @@ from doe.diagnose.emulator import (
     emulated,
     planar_weights,
     regression,
+    shrunk_covariance,
     signature_prior,
     signature_scales,
 )
@@ -417,6 +418,34 @@ def test_what_cannot_teach_is_refused():
         emulated(lessons_of(sample, {"push": (0, 1.0)}), [Way("push", "push")])
     with pytest.raises(StatisticsError, match="pull: 0 pours"):
         emulated(lessons_of(sample, {}), [Way("pull", "pull")])
+
+
+def test_a_correlation_of_many_pours_is_kept_and_one_of_few_shrunk():
+    """λ* = Σ Var(r)/Σ r², Var(r) the variance of a product of two standardised features over n − 1, by hand."""
+    rng = np.random.default_rng(3)
+    mixed = rng.standard_normal((400, 2)) @ np.linalg.cholesky([[1.0, 0.6], [0.6, 1.0]]).T * [2.0, 0.1]
+    for n, least in ((400, 0.95), (8, 0.0)):
+        x = mixed[:n]
+        deviation = np.sqrt((x**2).mean(axis=0))
+        products = (x / deviation).prod(axis=1)
+        r = products.mean()
+        share = min(1.0, products.var() / (n - 1) / r**2)
+        assert 1.0 - share >= least
+        expected = np.array([[1.0, (1.0 - share) * r], [(1.0 - share) * r, 1.0]]) * np.outer(deviation, deviation)
+        assert shrunk_covariance(x) == pytest.approx(expected)
+
+
+def test_the_scatter_of_groups_of_two_is_that_of_one_pour():
+    """Each mean takes a degree of freedom: 31 groups of two pours tell a deviation to 1/√62."""
+    rng = np.random.default_rng(6)
+    way = np.repeat(np.arange(-1, 30), 2)
+    values = 3.0 * rng.standard_normal((62, 1)) + 10.0 * way[:, None]
+    lessons = Lessons(np.zeros((62, 0)), way, (way >= 0).astype(float), np.ones(62, bool), (values,))
+    taught = emulated(lessons, [Way(f"{k}", f"{k}") for k in range(30)])
+    pairs = values.reshape(31, 2)
+    assert taught.squashes[0].deviation == pytest.approx([np.sqrt(pairs.var(axis=1, ddof=1).mean())])
+    assert taught.squashes[0].deviation == pytest.approx([3.0], rel=0.35)
+    assert taught.freedom == 31
 
 
 def test_signatures_of_noise_alone_are_not_believed():
