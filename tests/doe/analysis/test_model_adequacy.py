@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import statsmodels.formula.api as smf
+from scipy import stats
 
 from doe.analysis.model_adequacy import diagnose_fit
 from doe.analysis.surface import fit_surface
@@ -26,6 +27,23 @@ def test_every_measure_agrees_with_statsmodels():
     assert found.external == pytest.approx(influence.resid_studentized_external, rel=1e-9)
     assert found.cooks_distance == pytest.approx(influence.cooks_distance[0], rel=1e-9)
     assert found.dffits == pytest.approx(influence.dffits[0], rel=1e-9)
+    # At the limit p of the largest of all runs is 0.05, by t with one degree of freedom less than the error's.
+    df = len(YIELD) - 6 - 1
+    assert 2 * len(YIELD) * stats.t.sf(found.outlier_limit, df) == pytest.approx(0.05)
+    assert found.shapiro_p == pytest.approx(stats.shapiro(found.internal).pvalue)
+
+
+def test_a_run_far_from_the_others_has_leverage():
+    """A line: h = 1/n + (x − x̄)²/Σ(x − x̄)²; of twelve runs 2p/n is 0.333, and half of all is not reached."""
+    x = np.append(np.linspace(-0.4, 0.4, 11), 0.7)
+    y = x + 0.1 * np.random.default_rng(2).standard_normal(12)
+    surface = fit_surface(x[:, None], y, region("A"), ["A"])
+    found = diagnose_fit(surface, analyse_surface(surface))
+    h = 1 / 12 + (x - x.mean()) ** 2 / ((x - x.mean()) ** 2).sum()
+    assert found.leverage == pytest.approx(h)
+    assert 2 * 2 / 12 < h[11] < 3 * 2 / 12
+    assert found.leverage_limit == pytest.approx(2 * 2 / 12)
+    assert found.leveraged == (11,)
 
 
 def test_a_wrong_run_is_found_and_only_that():

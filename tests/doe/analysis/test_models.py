@@ -10,7 +10,7 @@ from statsmodels.stats.anova import anova_lm
 
 from doe.analysis.models import fit_summary, hierarchical, highest_order, terms_of
 from doe.analysis.optimum import bootstrap_coefficients
-from doe.analysis.surface import fit_surface
+from doe.analysis.surface import Blocks, fit_surface
 from doe.analysis.surface_anova import analyse_surface
 from doe.designs import box_behnken, factorial
 from doe.errors import StatisticsError
@@ -116,3 +116,14 @@ def test_terms_of_an_order():
     assert terms_of("AB", "linear") == ("A", "B")
     assert terms_of("AB", "interactions") == ("A", "B", "A*B")
     assert terms_of("AB", "quadratic") == ("A", "B", "A*B", "A^2", "B^2")
+
+
+def test_blocks_take_degrees_of_freedom_from_the_highest_order():
+    """Twelve runs and 3 terms up to the interaction: 4 are left beside five blocks, 3 beside six, 2 beside seven."""
+    coded = np.tile(factorial(2), (3, 1)).astype(float)
+    random = np.random.default_rng(1)
+    values = random.standard_normal((12, 1))
+    for number, order in ((5, "interactions"), (6, "interactions"), (7, "linear")):
+        block = random.permutation(np.resize(np.arange(number), 12))[:, None]
+        days = Blocks(tuple(map(str, range(number))), block)
+        assert highest_order(coded, values, "AB", blocks=days) == order
