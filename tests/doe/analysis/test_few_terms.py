@@ -5,6 +5,8 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+import statsmodels.api as sm
+from statsmodels.tools import eval_measures
 
 from doe.analysis.few_terms import few_terms, main_effect_aliases
 from doe.designs import DESIGNS, DesignOptions
@@ -29,6 +31,17 @@ def test_hamada_and_wu_s_model_of_the_cast_fatigue_data_is_found():
     assert best.r_squared == pytest.approx(0.89, abs=5e-3)
     assert best.coefficients == pytest.approx([5.73, 0.458, -0.459], abs=1e-3)
     assert best.p < 0.05
+
+
+def test_each_model_has_the_fit_and_the_aicc_of_another_program():
+    """statsmodels; its AICc has the constants n ln 2π + n, and counts σ as a parameter where that is told."""
+    for found in few_terms(CAST, NAMES, LIFE):
+        columns = [CAST[:, [NAMES.index(part) for part in term.split("*")]].prod(axis=1) for term in found.terms]
+        theirs = sm.OLS(LIFE, np.column_stack([np.ones(12), *columns])).fit()
+        assert found.coefficients == pytest.approx(theirs.params)
+        assert (found.r_squared, found.r_squared_adjusted) == pytest.approx((theirs.rsquared, theirs.rsquared_adj))
+        aicc = eval_measures.aicc(theirs.llf, 12, len(found.terms) + 2)
+        assert found.aicc == pytest.approx(aicc - 12 * (np.log(2 * np.pi) + 1))
 
 
 @pytest.mark.parametrize("terms", [("B",), ("A", "A*D"), ("C", "E", "C*E")])

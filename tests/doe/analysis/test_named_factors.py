@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 from statsmodels.formula.api import ols
 from statsmodels.stats.anova import anova_lm
 
@@ -90,6 +91,23 @@ def unbalanced(seed=0, n=60):
     frame = pd.DataFrame({"y": y, "x": x, "f": four, "t": two, "d": day})
     blocks = Blocks(("mon", "tue", "wed"), day[:, None])
     return coded, y[:, None], blocks, frame
+
+
+def test_the_whole_model_and_its_limits_are_those_of_statsmodels():
+    coded, y, _, frame = unbalanced()
+    found = fit_named(coded, y, region("ABC"), ((), NAMES, ("no", "yes")), "linear")
+    theirs = ols("y ~ x + C(f,Sum) + C(t,Sum)", frame).fit()
+    assert rows_of(found)["model"] == pytest.approx((theirs.ess, theirs.df_model, theirs.fvalue, theirs.f_pvalue))
+    first = next(one for one in found.means if (one.factor, one.name) == ("B", "w"))
+    assert (first.effect, first.standard_error, first.p) == pytest.approx(
+        (theirs.params["C(f, Sum)[S.0]"], theirs.bse["C(f, Sum)[S.0]"], theirs.pvalues["C(f, Sum)[S.0]"])
+    )
+    contrast = np.zeros(len(theirs.params))
+    contrast[[list(theirs.params.index).index(name) for name in ("Intercept", "C(f, Sum)[S.0]")]] = 1.0
+    mean = theirs.t_test(contrast)
+    assert (first.low, first.high) == pytest.approx(tuple(mean.conf_int()[0]))
+    # p of the largest of all runs is 0.05 at the limit, with one degree of freedom less than the error's.
+    assert 2 * 60 * stats.t.sf(found.outlier_limit, theirs.df_resid - 1) == pytest.approx(0.05)
 
 
 @pytest.mark.parametrize("seed", range(3))
