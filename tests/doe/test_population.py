@@ -71,6 +71,9 @@ def test_the_interval_is_that_of_the_mean():
     assert (low + high) / 2 == pytest.approx(19.0)
     assert (high - low) / 2 == pytest.approx(4.30265 * math.sqrt(13.0 / 3.0), rel=1e-5)
     assert all(math.isnan(end) for end in population(16.0).interval)
+    # Two values: t(0.975, 1) = 12.7062 (tables).
+    low, high = population(16.0, 18.0).interval
+    assert (low, high) == pytest.approx((17.0 - 12.7062, 17.0 + 12.7062), abs=1e-3)
 
 
 def test_few_former_pours_tell_nothing_about_chance():

@@ -126,6 +126,12 @@ def test_a_bare_printed_mean_is_tested_as_exact():
     assert found.equivalence.p == pytest.approx(equivalence_test(found.one_sample, 2.0).p)
 
 
+def test_a_single_measurement_is_taken_as_exact():
+    found = verified([24.0, 25.0, 24.5], 24.68, 1.6, 1)
+    assert (found.welch, found.pooled) == (None, None)
+    assert found.deciding.p == pytest.approx(stats.ttest_1samp([24.0, 25.0, 24.5], 24.68).pvalue)
+
+
 @pytest.mark.parametrize("runs", [[24.0], [24.0, 24.0, 24.0]])
 def test_runs_without_spread_cannot_tell(runs):
     found = verified(runs, 24.68, None, None)

@@ -102,6 +102,18 @@ def test_an_effect_under_which_no_pour_ends_is_infinitely_far():
         assert whitened_shift(declared, centre, [(moved,)]) == math.inf
 
 
+def test_a_shift_by_hand():
+    """Base (±1, ±1) in step, twice: s² = 8/7 each, covariance 8/7, halved by the shrinking; moved by (2, 1), two pours.
+
+    Six pours: 6 · (2, 1) C⁻¹ (2, 1)ᵀ with C = 8/7 [1, ½; ½, 1], less 6 (1/2 + 1/8) for each of two features.
+    """
+    declared = Declared((), (), (DeclaredCondition("one", ("a", "b")),))
+    base = [(PointPour((sign, sign), "measured"),) for sign in (1.0, -1.0) * 4]
+    moved = [(PointPour((2.0 + off, 1.0 - off), "measured"),) for off in (0.3, -0.3)]
+    square = 6.0 * 7.0 / 8.0 * (4.0 + 1.0 - 2.0) / 0.75 - 6.0 * (1.0 / 2.0 + 1.0 / 8.0) * 2
+    assert whitened_shift(declared, base, moved) == pytest.approx(math.sqrt(square))
+
+
 def test_a_new_summary_is_read_off_all_stored_pours_without_pouring(poured):
     """A data set of the same set-up that offers more: the pours of the first serve it as they are."""
     pours, jobs = poured

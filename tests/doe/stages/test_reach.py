@@ -91,6 +91,19 @@ def test_within_noise_nothing_is_out_of_reach(mean, within):
             ask()
 
 
+@pytest.mark.parametrize(("own", "pilot"), [(3.0, 0.5), (0.01, 0.5)])
+def test_a_corner_is_known_by_the_larger_of_its_own_scatter_and_the_pilot_s(own, pilot):
+    """Over √3 for three pours."""
+
+    class Known(Noise):
+        sigma = pilot
+
+    result = reach(study_of(12.0), PROFILE, FormulaRunner(pile, own), Known)
+    for corner, error in zip(result.corners, result.standard_errors, strict=True):
+        assert (corner.sd > pilot) == (own > pilot)
+        assert error == pytest.approx(max(corner.sd, pilot) / 3**0.5)
+
+
 def test_a_hopeless_study_stops_in_a_line_that_says_what_is_missing_and_how_to_go_on():
     runner = FormulaRunner(pile, SIGMA)
     with pytest.raises(StudyStopped, match="stopped in the reach stage: out of reach: ") as told:
