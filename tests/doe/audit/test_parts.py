@@ -9,6 +9,7 @@ from doe.audit.anova_table import consistency, read_lines, source_name
 from doe.audit.printed import most_agreed, printed, rounding_slack
 from doe.audit.restitution_formula import evaluated, flight, names_in
 from doe.audit.study import AnovaLine
+from doe.audit.verification import _targets as targets_of
 from doe.audit.verification import implied_target
 from doe.errors import AuditError
 
@@ -87,6 +88,13 @@ def test_errors_beyond_100_percent_imply_a_target_below_the_response_only():
     other = implied_target(responses, tuple(map(printed, ("180.0", "220.0", "32.0"))), stated)
     assert other is not None
     assert other.value == 25.0
+
+
+def test_an_error_implies_a_target_below_the_response_and_one_above():
+    """25.325 … 25.335 over 1 ± 6.965 … 6.975 %: the widest interval on either side."""
+    below, above = targets_of(25.33, 0.005, printed("6.97"))
+    assert below == pytest.approx((25.325 / 1.06975, 25.335 / 1.06965))
+    assert above == pytest.approx((25.325 / 0.93035, 25.335 / 0.93025))
 
 
 def test_formulas():

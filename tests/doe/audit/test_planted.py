@@ -10,7 +10,7 @@ from doe.audit import audit_study
 from doe.audit.printed import printed
 from doe.audit.study import DesignSteps
 from doe.audit.surface_refit import refit
-from tests.doe.audit.made_up import clean_study, shown
+from tests.doe.audit.made_up import CHOSEN, clean_study, shown
 
 
 @pytest.fixture(scope="module")
@@ -288,6 +288,16 @@ def test_a_mean_of_three_runs_is_held_against_its_own_prediction_interval(clean,
     assert [one.check for one in found].count("runs against the model") == remarks
 
 
+@pytest.mark.parametrize(("off", "remarks"), [(0.2, 1), (0.3, 0)])
+def test_an_error_below_that_of_the_mean_is_no_evidence(clean, off, remarks):
+    """Four runs of ± 0.433 have s = 0.5 and a mean known to 0.25."""
+    mean = clean.target.mean.value + off
+    runs = shown([mean - 0.4330127, mean + 0.4330127] * 2, 6)
+    verified = replace(clean.verified, responses=runs, mean=None, relative_error_percent=None, p_two_sample=None)
+    found = audit_study(replace(clean, verified=verified)).remarks
+    assert [one.check for one in found].count("what the runs can show") == remarks
+
+
 def test_an_ascent_step_far_from_the_model_is_remarked(clean):
     ascent = replace(clean.ascent, settings=clean.ascent.settings.copy(), errors=(), best=None)
     ascent.settings[3] = (clean.surface.low + clean.surface.high) / 2
@@ -305,6 +315,9 @@ def test_a_diagonal_of_the_ranges_is_no_steepest_ascent(clean):
     remarks = audit_study(replace(clean, ascent=replace(clean.ascent, settings=grid))).remarks
     (remark,) = [one for one in remarks if one.check == "direction of the ascent"]
     assert "even grid from end to end" in remark.text
+    sizes = np.sqrt([clean.screening.sums[k].value for k in CHOSEN])  # effects are the roots of sums of squares
+    shares = zip(clean.ascent.factors, sizes / sizes.max(), strict=True)
+    assert f"would be {', '.join(f'{name} {share:.2f}' for name, share in shares)}." in remark.text
     assert f"The best step, {clean.ascent.best}, is the grid's step {clean.ascent.best} of 6." in remark.text
 
 

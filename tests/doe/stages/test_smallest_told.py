@@ -15,10 +15,11 @@ from doe.analysis.surface import fit_surface
 from doe.analysis.verification import verify
 from doe.designs import plackett_burman
 from doe.stages.ascent import _approach, _first_order, _walk
-from doe.stages.surface import _smallest_main_effect
-from doe.stages.verification import _smallest_difference
+from doe.stages.surface import Estimate, OptimumResult, _smallest_main_effect
+from doe.stages.verification import _smallest_difference, verification
 from doe.studies.profile import Profile
 from doe.target import Target
+from tests.doe.formula_runner import FormulaRunner
 
 NOISE = Noise(mean=20.0, sigma=1.5, low=1.0, high=2.5, runs=9)
 PROFILE = Profile("test", ascent_replicates=4)
@@ -92,3 +93,36 @@ def test_the_verification_could_have_seen_what_welch_s_test_sees():
     bare = _smallest_difference(verify(runs, 25.0, None, None))
     assert seen(bare, runs.std(ddof=1) / math.sqrt(7), 6) == pytest.approx(0.8, abs=1e-3)
     assert math.isnan(_smallest_difference(verify(runs[:1], 25.0, 1.0, 12)))
+
+
+FACTORS = (SimpleNamespace(path="a"), SimpleNamespace(path="b"))
+SINGLE = SimpleNamespace(
+    identifies=lambda k: k == 0,
+    point_low=[1.0, 2.0],
+    point_high=[3.0, 4.0],
+    solution_low=[0.0] * 2,
+    solution_high=[9.0] * 2,
+)
+
+
+def test_a_factor_has_the_interval_of_its_point_or_the_range_that_gives_the_target():
+    found = OptimumResult({"a": 2.0, "b": 3.0}, FACTORS, SINGLE, None).estimates
+    assert found == {"a": Estimate(2.0, 1.0, 3.0, True), "b": Estimate(3.0, 0.0, 9.0, False)}
+
+
+@pytest.mark.parametrize(("p", "known"), [(0.5, True), (0.011, True), (0.009, False)])
+def test_targets_that_contradict_each_other_identify_nothing(p, known):
+    joint = SimpleNamespace(low=[1.5, 0.0], high=[2.5, 9.0], identified=(True, False), p=p)
+    found = OptimumResult({"a": 2.0, "b": 3.0}, FACTORS, SINGLE, SimpleNamespace(), joint).estimates
+    assert found == {"a": Estimate(2.0, 1.5, 2.5, known), "b": Estimate(3.0, 0.0, 9.0, False)}
+
+
+def test_every_target_is_verified_within_its_own_margin():
+    targets = (dataclasses.replace(TARGET, margin=0.5), Target("bulk_density_kg_m3", 270.0, 2.0, 9, margin=7.0))
+    study = SimpleNamespace(targets=targets, all_experiments=("",))
+    found = verification(
+        study, dataclasses.replace(PROFILE, verification_runs=5), FormulaRunner(lambda values: 24.0), {}
+    )
+    assert [test.equivalence.margin for test in found.tests] == [0.5, 7.0]
+    assert len(found.runs) == 5
+    assert [test.target.mean for test in found.tests] == [25.0, 270.0]
