@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from doe.analysis.power import smallest_effect, smallest_main_effect
+from doe.analysis.power import smallest_difference, smallest_effect, smallest_main_effect
 from doe.designs import DESIGNS, ChosenDesign, DesignOptions
 from doe.errors import StatisticsError, StudyStopped
 from doe.stages import planned_runs
@@ -84,6 +84,39 @@ def test_an_estimator_that_reads_no_pile_is_no_candidate_and_stops_nothing(study
     assert any(note.startswith(f"{unread} is no candidate") for note in found.notes)
     with pytest.raises(StatisticsError, match=r"^angle_of_repose_deg: values holds 0 valid run"):
         pilot(study, PROFILE, FormulaRunner(planted, others={"angle_of_repose_deg": lambda values: np.nan}), BIAS)
+
+
+def test_screening_is_sized_by_the_noise_of_its_estimator_and_the_walk_by_that_of_the_target(study):
+    """The cone of mass scatters twice as much, and sees six times as much of a change."""
+    cone, target = "angle_of_repose_mass_cone_deg", study.targets[0].observable
+
+    class Keen(FormulaRunner):
+        def _once(self, stage, row, setting, replicate, attempt):
+            run = super()._once(stage, row, setting, replicate, attempt)
+            truth = planted(setting.values)
+            seen = 24.0 + 6.0 * (truth - 24.0) + 2.0 * (run.observables[target] - truth)
+            return dataclasses.replace(run, observables=run.observables | {cone: seen})
+
+    profile = dataclasses.replace(PROFILE, resolution_deg=2.0, max_replicates=40)
+    found = pilot(study, profile, Keen(planted, sigma=0.8), BIAS)
+    assert found.estimator == cone
+    assert found.noise[cone].sigma == pytest.approx(2.0 * found.noise[target].sigma)
+    size = {one.stage: one for one in found.sizes}
+    expected = smallest_main_effect(
+        found.noise[cone].sigma, size["screening"].taken, 28, comparisons=len(study.factors)
+    )
+    assert size["screening"].resolved == pytest.approx(expected)
+    assert size["ascent"].resolved == pytest.approx(
+        smallest_difference(found.noise[target].sigma, size["ascent"].taken)
+    )
+
+
+def test_what_is_no_angle_is_no_estimator_for_one(study):
+    density = "bulk_density_kg_m3"
+    more = dataclasses.replace(study, estimators=(*study.estimators, density))
+    found = pilot(more, PROFILE, FormulaRunner(planted, sigma=0.8), BIAS)
+    assert density in found.noise
+    assert found.choice.estimators == study.estimators
 
 
 def test_planted_factors_are_found_and_the_others_are_not(campaign):
