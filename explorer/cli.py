@@ -90,7 +90,7 @@ def _one_line(text: str) -> str:
 app = typer.Typer(
     name="explorer",
     cls=Commands,
-    help="Pour, pile and calibrate granular material.",
+    help="Simulate, calibrate and diagnose granular materials.",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
@@ -112,14 +112,16 @@ def options(
     version: bool = typer.Option(
         False, "--version", callback=_print_version, is_eager=True, help="Print the version and exit."
     ),
-    arch: str | None = typer.Option(None, metavar="ARCH", help="Where the solver computes: cpu, cuda or vulkan."),
+    arch: str | None = typer.Option(
+        None, metavar="ARCH", help="Processor for the solver: cpu, cuda or vulkan; by default $EXPLORER_ARCH or cpu."
+    ),
     log_level: str | None = typer.Option(
         None,
         metavar="LEVEL",
-        help="Log to standard error, as JSON lines, from this level on: debug, info, warning, error.",
+        help="Lowest level logged to standard error, as JSON lines: debug, info, warning or error.",
     ),
 ) -> None:
-    """Pour, pile and calibrate granular material."""
+    """Simulate, calibrate and diagnose granular materials."""
     if arch is not None:
         # Here and not above: `doctor` is to start where a package of the solver is missing.
         from solver.arch import choose

@@ -6,36 +6,48 @@ from pathlib import Path
 
 import typer
 
+from explorer.commands.shared_options import AUTHOR, NOTES, RESULT_JSON, report_option
 from explorer.design.choices import ModelOrder, Reduction, Surrogate
 
 
 def analyse(
-    sheet: str = typer.Argument(metavar="RUNS.csv", help="Filled sheet of `explorer design`, or a shipped one's name."),
-    response: str = typer.Option("", metavar="NAME", help="Column to analyse; needed where there are several."),
-    target: float | None = typer.Option(None, help="Value that the response should have: which settings give it?"),
-    target_error: float = typer.Option(0.0, min=0.0, help="Standard error of the target, in its unit."),
-    model: ModelOrder | None = typer.Option(None, help="By default the highest order that the runs can bear."),
-    terms: str = typer.Option("", metavar="A,B,A*B,…", help="Instead of an order, the terms; what they need is added."),
+    sheet: str = typer.Argument(metavar="RUNS.csv", help="Completed sheet of `explorer design`: file or shipped name."),
+    response: str = typer.Option("", metavar="NAME", help="Response column to analyse; required if there are several."),
+    target: float | None = typer.Option(None, help="Desired value of the response; finds the settings that give it."),
+    target_error: float = typer.Option(0.0, min=0.0, help="Standard error of --target, in its unit."),
+    model: ModelOrder | None = typer.Option(
+        None, help="Order of the model; by default the highest that the runs support."
+    ),
+    terms: str = typer.Option(
+        "",
+        metavar="A,B,A*B,…",
+        help="Terms of the model, instead of --model; lower-order terms that they require are added.",
+    ),
     reduce: Reduction | None = typer.Option(
-        None, help="Drop terms one by one, factors after their products: by AICc, or while p > 0.05."
+        None, help="Drop terms one at a time, a factor only after its products and squares: by AICc, or while p > 0.05."
     ),
     surrogate: Surrogate | None = typer.Option(
-        None, help="A Gaussian process beside the polynomial: which predicts better? --target is answered by it."
+        None,
+        help="Also fit a Gaussian process, compare its predictions with the polynomial's, and use it for --target.",
     ),
-    only: str = typer.Option("", metavar="NAME,…", help="Only these factors; the others count as scatter."),
-    block: str = typer.Option("", metavar="NAME", help="Column of days, batches or operators: a fixed effect each."),
+    only: str = typer.Option("", metavar="NAME,…", help="Analyse only these factors; the others count as scatter."),
+    block: str = typer.Option(
+        "", metavar="NAME", help="Column of blocks (days, batches, operators), each with a fixed effect."
+    ),
     random: str = typer.Option(
-        "", metavar="NAME", help="Column of groups drawn at random (days, whole plots, seeds): a variance component."
+        "",
+        metavar="NAME",
+        help="Column of groups drawn at random (days, whole plots, seeds), with a variance component.",
     ),
-    factors: str | None = typer.Option(None, metavar="FILE", help="Factors file, for a sheet that declares none."),
-    report: Path | None = typer.Option(
-        None, "--report", "--out", metavar="DIR", help="New folder for result.json, the report, its figures and data."
+    factors: str | None = typer.Option(
+        None, metavar="FILE", help="Factors file, for a sheet that declares no factors."
     ),
-    author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
-    notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
-    json: bool = typer.Option(False, "--json", help="Print the result as JSON, and nothing else."),
+    report: Path | None = report_option("result.json", "--report", "--out"),
+    author: str = AUTHOR,
+    notes: str = NOTES,
+    json: bool = RESULT_JSON,
 ) -> None:
-    """Effects, model, analysis of variance, diagnostics, canonical analysis, and the settings that give a target."""
+    """Analyse a designed experiment: effects, model, analysis of variance, diagnostics, settings that give a target."""
     from explorer.design.analysis import AnalyseOrder, run_analyse
     from explorer.design.text import analysis_text
     from explorer.errors import CommandError

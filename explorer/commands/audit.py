@@ -6,25 +6,26 @@ from pathlib import Path
 
 import typer
 
+from explorer.commands.shared_options import AUTHOR, NOTES, RESULT_JSON, report_option
+
 
 def audit(
     folder: Path | None = typer.Argument(
         None,
         metavar="[FOLDER]",
-        help="Folder with study.toml and its tables (doe/audit/README.md); the shipped article if not given.",
+        help="Folder with study.toml and its tables (doe/audit/README.md); by default the shipped article.",
         show_default=False,
     ),
-    json: bool = typer.Option(False, "--json", help="Print every finding as plain data."),
-    author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
-    notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
-    report: Path | None = typer.Option(
-        None, "--report", "--out", metavar="DIR", help="New folder for audit.json, the report, its figures and data."
-    ),
+    json: bool = RESULT_JSON,
+    author: str = AUTHOR,
+    notes: str = NOTES,
+    report: Path | None = report_option("audit.json", "--report", "--out"),
 ) -> None:
-    """Recompute every figure of a published calibration study that can be recomputed.
+    """Recompute the figures of a published calibration study from its own tables.
 
-    Each is reproduced exactly, only if the runs or other inputs were rounded (with the slack), differs (with the
-    recomputed value and how it came about), or cannot be checked (with the reason). Exit code 0 whatever was found.
+    Each figure is reproduced exactly, reproduced only if the runs or other inputs were rounded (with the slack),
+    different (with the recomputed value and its derivation) or not checkable (with the reason). The exit code is 0
+    whatever is found.
     """
     from doe.audit import audit_study
     from explorer.audit.read_study import read_study, shipped_study

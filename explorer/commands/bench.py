@@ -16,34 +16,47 @@ USUAL_DURATION = 4.0
 
 def bench(
     only: list[str] = typer.Option(
-        [], metavar="CASE", help="Only this case: short, pour, bed or batch; may be repeated."
+        [], metavar="CASE", help="Run only this case: short, pour, bed or batch; repeatable."
     ),
     duration: float = typer.Option(
-        USUAL_DURATION, metavar="S", help="Simulated time of the pour [s].", min=0.2, max=30.0
+        USUAL_DURATION, metavar="S", help="Simulated time of the case pour [s].", min=0.2, max=30.0
     ),
     spheres: list[int] = typer.Option(
-        [], metavar="N", help="Beds to run: 1000, 10000, 100000 (these are the usual ones), 1000000; may be repeated."
+        [],
+        metavar="N",
+        help="Spheres in a bed: 1000, 10000, 100000 or 1000000; by default all but the last; repeatable.",
     ),
-    rounds: int = typer.Option(5, metavar="N", help="How often the engines take turns on a case.", min=1, max=99),
-    peers: bool = typer.Option(True, help="Run LIGGGHTS and YADE too, where they are installed."),
+    rounds: int = typer.Option(
+        5,
+        metavar="N",
+        help="Rounds in which the engines take turns; at most 3 if the first exceeds 60 s.",
+        min=1,
+        max=99,
+    ),
+    peers: bool = typer.Option(True, help="Also run LIGGGHTS and YADE where they are installed."),
     peer_limit: float = typer.Option(
-        900.0, metavar="S", help="Wall time after which a peer's run is stopped, and printed as timed out [s].", min=1.0
+        900.0,
+        metavar="S",
+        help="Wall time after which a run of LIGGGHTS or YADE is stopped and reported as timed out [s].",
+        min=1.0,
     ),
     json: Path | None = typer.Option(
-        None, "--json", metavar="FILE", help="Write every measurement to this file, each as soon as it is made."
+        None, "--json", metavar="FILE", help="File for all measurements, rewritten after each."
     ),
     table: Path | None = typer.Option(
-        None, metavar="FILE.md", help="Write the table with date and machine to this file, anew with every measurement."
+        None, metavar="FILE.md", help="File for the table with date and machine, rewritten after each measurement."
     ),
     against: Path | None = typer.Option(
-        None, metavar="FILE.json", help="Warn of ratios to LIGGGHTS 10 % below those of this earlier --json."
+        None,
+        metavar="FILE.json",
+        help="Warn if a ratio to LIGGGHTS is more than 10 % below that in this earlier --json file.",
     ),
 ) -> None:
-    """Time the solver, and LIGGGHTS and YADE on the same cases.
+    """Time the solver, LIGGGHTS and YADE on the same cases.
 
-    One core, the same bodies, time step and simulated time, in turns. Leave the machine alone meanwhile; it takes
-    about ten minutes per peer. Where it is interrupted or a case fails, what was measured before is kept and marked
-    as incomplete. A ratio that has fallen is a warning; it does not change the exit code.
+    The engines take turns on one core with the same bodies, time step and simulated time. Leave the machine idle
+    otherwise; each peer takes about ten minutes. If the run is interrupted or a case fails, earlier measurements are
+    kept and marked as incomplete. A ratio that has fallen causes a warning and does not change the exit code.
     """
     import shutil
 

@@ -6,16 +6,18 @@ from pathlib import Path
 
 import typer
 
-from explorer.commands.serve import HOST, TOKEN
+from explorer.commands.shared_options import HOST, PORT, TOKEN
 
 
 def board(
-    folder: Path = typer.Argument(help="Output folder of `explorer calibrate` or `explorer diagnose`."),
-    port: int = typer.Option(8080, min=0, max=65535, help="Port of the page; 0 takes a free one."),
+    folder: Path = typer.Argument(
+        metavar="FOLDER", help="Output folder of `explorer calibrate` or `explorer diagnose`."
+    ),
+    port: int = PORT,
     host: str = HOST,
     token: str | None = TOKEN,
 ) -> None:
-    """Show verdict, charts, answers and runs of a study or a diagnosis; what still runs is followed."""
+    """Show the verdict, charts, answers and runs of a finished or running study or diagnosis on one page."""
     from explorer.viewer.app import board as serve_board
 
     serve_board(folder, host=host, port=port, token=token)

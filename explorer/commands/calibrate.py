@@ -6,45 +6,56 @@ from pathlib import Path
 
 import typer
 
+from explorer.commands.shared_options import AUTHOR, EVENTS, NOTES, RESUME, SCHEDULER, STORE, THREADS
+
 FAILURE, ABOVE_LIMIT, MOVED = 1, 3, 4
 
 
 def calibrate(
     headless: bool = typer.Option(
-        False, "--headless", help="Run here, without a page; the page runs it from its own panel."
+        False,
+        "--headless",
+        help="Required: run here, without the page (`explorer serve` starts studies from its own panel).",
     ),
-    study: str = typer.Option("sunflower_extract", help="A shipped study or the path of a study file."),
-    profile: str = typer.Option("standard", help="Size of the study: a [profile.NAME] of the study file."),
+    study: str = typer.Option("sunflower_extract", metavar="STUDY", help="Study: file or shipped name."),
+    profile: str = typer.Option(
+        "standard", metavar="NAME", help="Size of the study: a [profile.NAME] of the study file."
+    ),
     target: Path | None = typer.Option(
-        None, metavar="DIR", help="Photographs in place of the study's angle: a folder of `explorer measure --target`."
+        None,
+        metavar="DIR",
+        help="Photographs instead of the study's angle: a folder written by `explorer measure --target`.",
     ),
-    out: Path = typer.Option(Path("results"), help="Folder for result.json, the report, its figures and data."),
-    resume: bool = typer.Option(False, "--resume", help="Go on in a folder that is not empty."),
-    store: Path | None = typer.Option(None, help="SQLite file that keeps every run."),
+    out: Path = typer.Option(
+        Path("results"), metavar="DIR", help="Output folder for the report, its figures and data, and result.json."
+    ),
+    resume: bool = RESUME,
+    store: Path | None = STORE,
     record: Path | None = typer.Option(
         None,
         metavar="FILE.rrd|DIR",
-        help="New recording of the piles, a finished OUT is only recorded; or a folder for all verification pours.",
+        help="New recording of the piles (a finished --out is only recorded), or folder for recordings of all "
+        "verification pours.",
     ),
-    threads: int | None = typer.Option(None, min=1, help="Pours at the same time; one per core if not given."),
-    scheduler: str = typer.Option("", metavar="tcp://…", help="Pour on the workers of this Dask scheduler."),
-    tries: int = typer.Option(3, min=1, max=20, help="Seeds tried for one replicate that gives no valid pour."),
+    threads: int | None = THREADS,
+    scheduler: str = SCHEDULER,
+    tries: int = typer.Option(3, min=1, max=20, metavar="N", help="Seeds tried for a replicate without a valid pour."),
     beyond_reach: bool = typer.Option(
-        False, "--beyond-reach", help="Go on where no setting of the factors comes near the target."
+        False, "--beyond-reach", help="Continue even if no setting of the factors comes near the target."
     ),
-    author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
-    notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
+    author: str = AUTHOR,
+    notes: str = NOTES,
     fail_above: float | None = typer.Option(
-        None, min=0.0, help="Exit with 3 where the relative error of a target is above this [%]."
+        None, min=0.0, metavar="PERCENT", help="Exit with 3 if the relative error of a target exceeds this [%]."
     ),
     baseline: Path | None = typer.Option(
-        None, metavar="RESULT.json", help="Earlier result: exit with 4 if verdict, mean, noise or parameters moved."
+        None, metavar="RESULT.json", help="Earlier result; exit with 4 if the verdict, mean, noise or parameters moved."
     ),
-    summary: Path | None = typer.Option(None, metavar="FILE.md", help="Verdict and what moved, as Markdown for CI."),
-    junit: Path | None = typer.Option(None, metavar="FILE.xml", help="The same as JUnit XML, a case per question."),
-    json: bool = typer.Option(
-        False, "--json", "--events", help="Print events for CI, one JSON object per line, and nothing else."
+    summary: Path | None = typer.Option(
+        None, metavar="FILE.md", help="Markdown file for the verdict and what moved, for CI."
     ),
+    junit: Path | None = typer.Option(None, metavar="FILE.xml", help="The same as JUnit XML, one case per question."),
+    json: bool = EVENTS,
 ) -> None:
     """Calibrate a material: pilot, reach, screening, ascent, response surface, optimum, verification, report."""
     from doe.errors import StudyStopped

@@ -8,6 +8,7 @@ from pathlib import Path
 import typer
 
 from explorer.commands.listing import Listing
+from explorer.commands.shared_options import AUTHOR, NOTES, RESULT_JSON, report_option
 from explorer.design.choices import FEWEST, MOST, Alpha, ModelOrder
 
 
@@ -17,80 +18,97 @@ class Designs(Listing):
     heading = "Designs"
 
     def listed(self) -> Iterable[tuple[str, str]]:
-        """With what each is for."""
+        """Each with its purpose."""
         from doe.designs import DESIGNS
 
         return ((name, design.doc) for name, design in DESIGNS.items())
 
 
 def design(
-    kind: str = typer.Argument(metavar="DESIGN", help="One of the designs below."),
+    kind: str = typer.Argument(metavar="DESIGN", help="Design from the list below."),
     factors: str = typer.Option(
-        ..., metavar="FILE", help="TOML with name, low, high and unit of every factor, or a shipped one's name."
+        ..., metavar="FILE", help="TOML file with name, low, high and unit of every factor, or shipped name."
     ),
     out: Path = typer.Option(
-        ..., metavar="FILE.csv", help="New sheet, .csv or .xlsx: one line per run in the order to run them."
+        ..., metavar="FILE.csv", help="New sheet (.csv or .xlsx), one line per run in the order in which to run them."
     ),
     runs: int | None = typer.Option(
         None,
         min=FEWEST["runs"],
-        help="plackett-burman: size of the table, 8 … 48; factorial: best fraction; others: points.",
+        help="Number of runs (plackett-burman: 8, 12, … 48; factorial: the best fraction of this size).",
     ),
     replicates: int | None = typer.Option(
-        None, min=FEWEST["replicates"], max=MOST["replicates"], help="Runs of each row; 1 if not given."
+        None,
+        min=FEWEST["replicates"],
+        max=MOST["replicates"],
+        help="Replicates of each row; by default as in the factors file, otherwise 1.",
     ),
     centre: int | None = typer.Option(
         None,
         min=FEWEST["centre"],
         max=MOST["centre"],
-        help="Runs with every factor in the middle; with --blocks in each block.",
+        help="Number of centre runs; with --blocks, in each block.",
     ),
     blocks: int | None = typer.Option(
         None,
         min=FEWEST["blocks"],
         max=MOST["blocks"],
-        help="Orthogonal blocks (days, batches): their effects take nothing from the model's.",
+        help="Number of orthogonal blocks (days, batches), whose effects do not bias those of the model.",
     ),
     fold: bool = typer.Option(False, "--fold", help="plackett-burman: add the mirror image of every row."),
     nonregular: bool = typer.Option(
-        False, "--nonregular", help="plackett-burman, 16 and 32 runs: no main effect is wholly an interaction of two."
+        False,
+        "--nonregular",
+        help="plackett-burman, 16 or 32 runs: no main effect is fully aliased with a two-factor interaction.",
     ),
-    generator: list[str] = typer.Option([], metavar="E=ABC", help="factorial: a fraction; may be repeated."),
+    generator: list[str] = typer.Option([], metavar="E=ABC", help="factorial: generator of a fraction; repeatable."),
     fraction: int = typer.Option(
-        0, min=FEWEST["fraction"], help="factorial: 2^(k−P) of minimum aberration.", metavar="P"
+        0, min=FEWEST["fraction"], help="factorial: the 2^(k−P) fraction of minimum aberration.", metavar="P"
     ),
-    alpha: Alpha = typer.Option(Alpha.ROTATABLE, help="central-composite: where the axial points stand."),
-    model: ModelOrder | None = typer.Option(None, help="d-optimal, i-optimal: of whose terms; quadratic if not given."),
+    alpha: Alpha = typer.Option(Alpha.ROTATABLE, help="central-composite: position of the axial points."),
+    model: ModelOrder | None = typer.Option(
+        None, help="d-optimal, i-optimal: model to design for; by default quadratic."
+    ),
     constraint: list[str] = typer.Option(
-        [], metavar="'A + B <= 1'", help="d-optimal, i-optimal: in the factors' units; may be repeated."
+        [], metavar="'A + B <= 1'", help="d-optimal, i-optimal: constraint in the factors' units; repeatable."
     ),
     augment: Path | None = typer.Option(
-        None, metavar="RUNS.csv", help="d-optimal, i-optimal: keep this sheet's finished runs, and add --runs to them."
+        None,
+        metavar="RUNS.csv",
+        help="d-optimal, i-optimal: keep the finished runs of this sheet and add --runs to them.",
     ),
     lattice: int | None = typer.Option(
         None,
         min=FEWEST["lattice"],
         max=MOST["lattice"],
         metavar="M",
-        help="mixture: all blends in steps of 1/M; the simplex centroid if not given.",
+        help="mixture: all blends in steps of 1/M; by default the simplex centroid.",
     ),
     seed: int | None = typer.Option(
-        None, min=FEWEST["seed"], help="Of the order of the runs, and of designs that are drawn; 1 if not given."
+        None,
+        min=FEWEST["seed"],
+        help="Seed of the run order and of random designs; by default as in the factors file, otherwise 1.",
     ),
     decimal_comma: bool = typer.Option(
-        False, "--decimal-comma", help="CSV with 0,5 for 0.5 and semicolons, as spreadsheets of many languages open it."
+        False,
+        "--decimal-comma",
+        help="Write the CSV with decimal commas and semicolons, as spreadsheets in many languages expect.",
     ),
-    standard_order: bool = typer.Option(False, "--standard-order", help="Do not shuffle the runs."),
-    sigma: float | None = typer.Option(None, help="Standard deviation of one run: what will the design see?"),
-    effect: float | None = typer.Option(None, help="With which chance will it see a change so large?"),
-    report: Path | None = typer.Option(
-        None, metavar="DIR", help="New folder for plan.json, the report of the runs, its figures and data."
+    standard_order: bool = typer.Option(
+        False, "--standard-order", help="Keep the runs in standard order instead of shuffling them."
     ),
-    author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
-    notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
-    json: bool = typer.Option(False, "--json", help="Print plain data."),
+    sigma: float | None = typer.Option(
+        None, help="Standard deviation of one run; prints which effects the design can detect."
+    ),
+    effect: float | None = typer.Option(
+        None, help="With --sigma: size of a change; prints the probability of detecting it."
+    ),
+    report: Path | None = report_option("plan.json", "--report"),
+    author: str = AUTHOR,
+    notes: str = NOTES,
+    json: bool = RESULT_JSON,
 ) -> None:
-    """Write the runs of a design; says what is confused with what, and which effects it will be able to see."""
+    """Write the runs of a designed experiment, with its aliases and the effects that it can detect."""
     from doe.table_file import WORKBOOK
     from explorer.design.factors_file import read_factors
     from explorer.design.run_plan import DesignOrder, make_plan, sheet_content

@@ -6,39 +6,47 @@ from pathlib import Path
 
 import typer
 
+from explorer.commands.shared_options import AUTHOR, EVENTS, NOTES, RESUME, SCHEDULER, STORE, THREADS
+
 
 def diagnose(
     folder: str = typer.Argument(
-        ..., metavar="DIR", help="Folder with measurement.toml, or a shipped data set's name."
+        ..., metavar="DIR", help="Folder of measured data (with measurement.toml), or shipped name."
     ),
-    out: Path = typer.Option(Path("diagnosis"), help="Folder for diagnosis.json, the report, its figures and data."),
-    effects: str = typer.Option("", metavar="A,B,…", help="Candidates; all effects if not given."),
-    budget: int | None = typer.Option(None, min=1, metavar="POURS", help="About so many pours for the emulator."),
-    resume: bool = typer.Option(False, "--resume", help="Go on in a folder that is not empty."),
-    store: Path | None = typer.Option(None, help="SQLite file that keeps every pour."),
-    threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),
-    scheduler: str = typer.Option("", metavar="tcp://…", help="Pour on the workers of this Dask scheduler."),
-    seed: int = typer.Option(0, min=0, help="Of the pours; another one asks for others."),
+    out: Path = typer.Option(
+        Path("diagnosis"),
+        metavar="DIR",
+        help="Output folder for the report, its figures and data, and diagnosis.json.",
+    ),
+    effects: str = typer.Option("", metavar="A,B,…", help="Candidate effects; by default all."),
+    budget: int | None = typer.Option(
+        None, min=1, metavar="POURS", help="Approximate number of pours for the emulator."
+    ),
+    resume: bool = RESUME,
+    store: Path | None = STORE,
+    threads: int | None = THREADS,
+    scheduler: str = SCHEDULER,
+    seed: int = typer.Option(0, min=0, help="Seed of the pours; another seed gives other pours."),
     follow_up: Path | None = typer.Option(
-        None, "--follow-up", metavar="DIR", help="The folder OUT/next of an ambiguous answer, filled in."
+        None, "--follow-up", metavar="DIR", help="Completed folder OUT/next of an ambiguous diagnosis."
     ),
     given: Path | None = typer.Option(
-        None, metavar="DIR", help="A finished diagnosis: with its effect in the model, what else is missing?"
+        None,
+        metavar="DIR",
+        help="Folder of a finished diagnosis: include its effect in the model and look for further ones.",
     ),
     plan_next: bool = typer.Option(
-        True, "--next/--no-next", help="Pour what could be measured next if the answer is ambiguous."
+        True, "--next/--no-next", help="If the answer is ambiguous, simulate what could be measured next."
     ),
-    author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
-    notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
+    author: str = AUTHOR,
+    notes: str = NOTES,
     apply: bool = typer.Option(False, "--apply", help="Also write the corrected material as OUT/corrected.toml."),
     record: Path | None = typer.Option(
-        None, metavar="FILE.rrd", help="New recording of the piles; a finished OUT is only recorded."
+        None, metavar="FILE.rrd", help="New recording of the piles (a finished --out is only recorded)."
     ),
-    json: bool = typer.Option(
-        False, "--json", "--events", help="Print events for CI, one JSON object per line, and nothing else."
-    ),
+    json: bool = EVENTS,
 ) -> None:
-    """Calibrate the declared model, test what is left, name the missing effect, confirm it by fresh pours."""
+    """Calibrate the declared model, test its residuals, name the missing effect and confirm it with fresh pours."""
     from explorer.background.reporter import end_as_by_ctrl_c, reporter_of
     from explorer.diagnosis.run import DiagnoseOrder, run_diagnose
     from solver import check_scheduler

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import typer
 
+from explorer.commands.shared_options import RESULT_JSON
+
 NOT_READY = 1
 
 
 def doctor(
-    port: int = typer.Option(8080, min=1, max=65535, help="Port to check for the page."),
-    json: bool = typer.Option(False, "--json", help="Print plain data."),
+    port: int = typer.Option(8080, min=1, max=65535, help="Port of the page, checked for availability."),
+    json: bool = RESULT_JSON,
 ) -> None:
-    """Say what this machine has, what is missing, what that limits and how to get it.
+    """List what this machine has, what is missing, what that limits and how to get it.
 
-    Exit code 0 where pouring, calibrating, diagnosing and the page work, 1 where something is missing that they need.
-    Nothing is installed, poured or compiled; it takes some seconds.
+    The exit code is 0 if pouring, calibrating, diagnosing and the page work, and 1 if they need something that is
+    missing. Nothing is installed, poured or compiled; the check takes a few seconds.
     """
     from explorer.installation import examined, examined_result, examined_text, ready
 

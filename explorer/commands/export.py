@@ -8,6 +8,7 @@ from pathlib import Path
 import typer
 
 from explorer.commands.listing import Listing
+from explorer.commands.shared_options import RIG_MATERIAL, SCENE_HELP, SET
 
 SHORTEST, LONGEST = 0.1, 3600.0
 """Simulated time of an exported pour [s]; that of one here is 0.1 … 60 s."""
@@ -29,25 +30,29 @@ class Programs(Listing):
 def export(
     source: str = typer.Argument(
         metavar="RIG_OR_FILE",
-        help="A rig (funnel), or a material, set-up or study, by file or shipped name, or the folder of a calibration.",
+        help=f"{SCENE_HELP[:-1]}, or output folder of a calibration.",
     ),
     folder: Path = typer.Argument(metavar="DIR", help="New folder for the files."),
-    to: str = typer.Option(..., metavar="PROGRAM", help="One of the programs below."),
-    material: str | None = typer.Option(None, help="Material in the rig: file or shipped name."),
-    set_: list[str] = typer.Option([], "--set", metavar="PATH=VALUE", help="Set a parameter; may be repeated."),
-    seed: int | None = typer.Option(None, min=0, help="Seed of the pour; 1 if not given."),
+    to: str = typer.Option(..., metavar="PROGRAM", help="Program from the list below."),
+    material: str | None = RIG_MATERIAL,
+    set_: list[str] = SET,
+    seed: int | None = typer.Option(None, min=0, help="Seed of the pour; by default 1."),
     time: float | None = typer.Option(
-        None, min=SHORTEST, max=LONGEST, help="Simulated time in s; that of our pour by default."
+        None, min=SHORTEST, max=LONGEST, metavar="S", help="Simulated time [s]; by default that of the pour made here."
     ),
     every: float | None = typer.Option(
-        None, min=1e-3, max=60.0, metavar="S", help="A moment every so many simulated s, not the last one only."
+        None,
+        min=1e-3,
+        max=60.0,
+        metavar="S",
+        help="Simulated time between exported states [s]; by default only the last state is exported.",
     ),
 ) -> None:
-    """Write a pour for another program.
+    """Write a pour or a material for another program.
 
-    A deck for an engine needs the pour, which runs here first: when and where a body enters depends on what lies in its
-    way. What the coefficients mean there is told in the folder. The folder that `explorer calibrate` wrote stands for
-    its study with the factors at the optimum.
+    For an input deck the pour runs here first, because when and where a body enters depends on what lies in its way.
+    The folder explains what the coefficients mean in the other program. The output folder of `explorer calibrate`
+    stands for its study with the factors at the optimum.
     """
     from explorer.errors import CommandError
     from explorer.export import EXPORTS

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import typer
 
+from explorer.commands.shared_options import AUTHOR, NOTES, report_option
+
 
 class Test(StrEnum):
     """Bench tests whose readings can be evaluated."""
@@ -28,38 +30,46 @@ class Test(StrEnum):
 
 
 def lab(
-    test: Test = typer.Argument(help="What was measured."),
+    test: Test = typer.Argument(help="Bench test whose readings are evaluated."),
     file: str | None = typer.Argument(
         None,
         metavar="[FILE.csv]",
-        help="The readings, one row per replicate or point of a curve; or a shipped example.",
+        help="Readings, one row per replicate or point of a curve: file or name of a shipped example.",
     ),
     compression: str | None = typer.Option(
-        None, metavar="FILE.csv", help="With shear: compression tests of the same components, for Poisson's ratio."
+        None, metavar="FILE.csv", help="With shear: compression readings of the same components, for Poisson's ratio."
     ),
-    leave_out: list[str] = typer.Option([], metavar="NAME", help="With composition: a component that is not poured."),
+    leave_out: list[str] = typer.Option(
+        [], metavar="NAME", help="With composition: component to leave out because it is not poured; repeatable."
+    ),
     out: Path | None = typer.Option(
-        None, metavar="PART.toml", help="New file with the parameters and their origin; with --template FILE.csv."
+        None,
+        metavar="PART.toml",
+        help="New file for the parameters and their origin; with --template, FILE.csv for the sheet.",
     ),
     template: bool = typer.Option(
-        False, "--template", help="Print a sheet to fill in: columns, units, what to write, how many replicates."
+        False,
+        "--template",
+        help="Print an empty sheet to fill in: columns, units, what to write, number of replicates.",
     ),
     plot: Path | None = typer.Option(
-        None, metavar="FILE.html", help="New page: parameters, and the curves with their straight part."
+        None,
+        metavar="FILE.html",
+        help="With compression or shear: new page with the parameters and the curves with their straight part.",
     ),
-    report: Path | None = typer.Option(
-        None, metavar="DIR", help="New folder for the report of any test, its figures and data."
+    report: Path | None = report_option("bench.json", "--report"),
+    author: str = AUTHOR,
+    notes: str = NOTES,
+    simulate: bool = typer.Option(False, "--simulate", help="Simulate the bench test with the derived parameters."),
+    material: str | None = typer.Option(
+        None, metavar="MATERIAL", help="Material for --simulate: file or shipped name."
     ),
-    author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
-    notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
-    simulate: bool = typer.Option(False, "--simulate", help="Run the bench test on the solver with what was derived."),
-    material: str | None = typer.Option(None, help="Material of --simulate: file or shipped name."),
-    bias: bool = typer.Option(False, "--bias", help="Show where the test's usual formula misses what was put in."),
-    json: bool = typer.Option(False, "--json", help="Print the result as JSON, SI, and nothing else."),
+    bias: bool = typer.Option(False, "--bias", help="Show the bias of the test's usual formula."),
+    json: bool = typer.Option(False, "--json", help="Print the result as JSON in SI units and nothing else."),
 ) -> None:
-    """Evaluate the readings of a bench test: mean, spread, interval, normality, outliers, parameters of a material.
+    """Evaluate the readings of a bench test: mean, spread, interval, normality, outliers, material parameters.
 
-    With --simulate the exit code is 1 where what comes out is not within 1 % of what was put in.
+    With --simulate the exit code is 1 if a simulated value differs by more than 1 % from the value put in.
     """
     from explorer.laboratory.run import LabOrder, run_lab
 

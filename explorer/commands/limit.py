@@ -6,23 +6,29 @@ from pathlib import Path
 
 import typer
 
+from explorer.commands.shared_options import STORE, THREADS
+
 
 def limit(
     source: str = typer.Argument(
         "",
         metavar="[DIR|FILE]",
-        help="Folder with measurement.toml, or a shipped data set's name; only what it declares is used. Or a made-up "
-        "laboratory's file; the shipped one if not given.",
+        help="Folder of measured data (with measurement.toml), or shipped name, of which only the declarations are "
+        "used; or file of a made-up laboratory. By default the shipped laboratory.",
     ),
-    rounds: int = typer.Option(8, min=1, help="Rounds of reference pours; 8 give 96 of each effect."),
-    out: Path = typer.Option(Path("limit.json"), help="File for the strengths, the pairs that look alike, the limits."),
+    rounds: int = typer.Option(8, min=1, help="Rounds of reference pours; 8 rounds give 96 pours of each effect."),
+    out: Path = typer.Option(
+        Path("limit.json"), metavar="FILE", help="File for the effect strengths, the pairs that look alike, the limits."
+    ),
     reference: Path = typer.Option(
-        Path("reference.npz"), help="File of the pours' features; written after every round, and gone on with."
+        Path("reference.npz"),
+        metavar="FILE",
+        help="File for the features of the pours; rewritten after every round, and continued if it exists.",
     ),
-    store: Path | None = typer.Option(None, help="SQLite file that keeps every pour."),
-    threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),
+    store: Path | None = STORE,
+    threads: int | None = THREADS,
 ) -> None:
-    """Pour every effect many times and print the Bayes limit: what scalars, profiles and scans can tell at best."""
+    """Print how often any diagnosis could name the right effect at best (Bayes limit), from many pours of each."""
     from doe.validation.laboratory import TREFOILS
     from explorer.background.reporter import end_as_by_ctrl_c
     from explorer.diagnosis.limit import LimitOrder, limit_text, run_limit

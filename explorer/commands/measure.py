@@ -7,48 +7,61 @@ from pathlib import Path
 
 import typer
 
+from explorer.commands.shared_options import AUTHOR, NOTES, report_option
+
 FAILURE = 1
 
 
 def measure(
     photos: list[str] = typer.Argument(
-        metavar="PHOTO...", help="JPEG, PNG, TIFF, BMP or WebP of one pile from the side; or a shipped one's name."
+        metavar="PHOTO...",
+        help="Photograph of one pile from the side (JPEG, PNG, TIFF, BMP or WebP): file or shipped name.",
     ),
-    scale: float | None = typer.Option(None, metavar="MM_PER_PX", help="Length of a pixel in mm."),
+    scale: float | None = typer.Option(None, metavar="MM_PER_PX", help="Length of a pixel [mm]."),
     reference_length: float | None = typer.Option(
-        None, metavar="MM", help="Length in mm of the one straight bar in the picture, or between --reference."
+        None,
+        metavar="MM",
+        help="Length [mm] of the only straight bar in the picture, or between the ends given by --reference.",
     ),
     reference: str | None = typer.Option(
-        None, metavar="X0,Y0,X1,Y1", help="Ends of the reference length in px, from the top left corner."
+        None, metavar="X0,Y0,X1,Y1", help="Ends of --reference-length [px], from the top left corner."
     ),
     baseline: str = typer.Option(
-        "auto", metavar="auto|Y0,Y1", help="Plate in px from the top, at the left and the right edge of the picture."
+        "auto",
+        metavar="auto|Y0,Y1",
+        help="Height of the plate at the left and right edges of the picture [px from the top].",
     ),
     checkerboard: str | None = typer.Option(
-        None, metavar="PHOTO", help="A printed checkerboard by the same camera: its corners tell the lens, taken out."
+        None,
+        metavar="PHOTO",
+        help="Photograph of a printed checkerboard from the same camera, for correcting lens distortion.",
     ),
-    json: bool = typer.Option(False, "--json", help="Print plain data, with the profiles, and nothing else."),
-    plot: Path | None = typer.Option(None, metavar="FILE.png", help="New file: the pictures with what was read."),
+    json: bool = typer.Option(False, "--json", help="Print the result as JSON, with the profiles, and nothing else."),
+    plot: Path | None = typer.Option(
+        None, metavar="FILE.png", help="New picture of the photographs with the readings drawn in."
+    ),
     outline: Path | None = typer.Option(
-        None, metavar="FILE.csv", help="New file: the outline, for the page to lay over a simulated pile."
+        None, metavar="FILE.csv", help="New file for the outline, which the page can show over a simulated pile."
     ),
     target: Path | None = typer.Option(
         None,
         metavar="DIR|STUDY.toml",
-        help="Keep the pictures in this folder, for `calibrate --target`; or write mean, SD and n into this study.",
+        help="Folder that stores the photographs for `explorer calibrate --target`; or study into which mean, SD and n "
+        "are written.",
     ),
-    report: Path | None = typer.Option(None, metavar="DIR", help="New folder for the report, its figures and data."),
-    author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
-    notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
+    report: Path | None = report_option("photograph.json", "--report"),
+    author: str = AUTHOR,
+    notes: str = NOTES,
     from_simulation: str | None = typer.Option(
         None,
         metavar="SOURCE",
-        help="Beside it a simulated pile, read alike: pile_*.npz, a folder of simulate --out, or what simulate takes.",
+        help="Also read a simulated pile in the same way: pile_*.npz, a folder of `explorer simulate --out`, or "
+        "any source that `explorer simulate` accepts.",
     ),
 ) -> None:
-    """Read the angle of repose off photographs of a pile.
+    """Read the angle of repose from photographs of piles.
 
-    Exit code 1 where a picture shows no pile that could be read; the line says why.
+    The exit code is 1 if a picture shows no readable pile; the message gives the reason.
     """
     from doe.studies.study import load_study
     from explorer.errors import CommandError

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import typer
 
-app = typer.Typer(help="Look at measured data.", no_args_is_help=True)
+from explorer.commands.shared_options import RESULT_JSON
+
+app = typer.Typer(help="Check measured data.", no_args_is_help=True)
 
 
 @app.callback()
 def measurements() -> None:
-    """Look at measured data."""
+    """Check measured data."""
 
 
 @app.command()
 def check(
-    folder: str = typer.Argument(..., metavar="DIR", help="Folder of a measured data set, or a shipped one's name."),
-    json: bool = typer.Option(False, "--json", help="Print plain data."),
+    folder: str = typer.Argument(
+        ..., metavar="DIR", help="Folder of measured data (with measurement.toml), or shipped name."
+    ),
+    json: bool = RESULT_JSON,
 ) -> None:
-    """Read measured data and say what they can tell.
+    """Read measured data and report what they can and cannot identify.
 
-    Lists conditions, observables and parameter ranges, what was ignored, and what no amount of fitting could reveal.
+    Lists conditions, observables, parameter ranges and ignored data, and what no fit could reveal.
     """
     from doe.measurement import load_measurement
     from explorer.files.run_folder import json_text

@@ -8,17 +8,19 @@ from typing import Literal
 
 import typer
 
+from explorer.commands.shared_options import RESULT_JSON
+
 app = typer.Typer(no_args_is_help=True)
-NAME = typer.Argument(metavar="NAME", help="Its name: letters, digits, - and _.")
-FOLDER = typer.Argument(metavar="NAME", help="The folder to make.")
-OUT = typer.Option(Path(), help="Folder to write into.")
+NAME = typer.Argument(metavar="NAME", help="Name: letters, digits, - and _.")
+FOLDER = typer.Argument(metavar="NAME", help="Folder name.")
+OUT = typer.Option(Path(), metavar="DIR", help="Folder to write into.")
 
 
 @app.callback()
 def new() -> None:
-    """Write a commented file that runs as it is, or a folder of measured data.
+    """Write a starter material, study, project or folder of measured data.
 
-    Files that are there are never overwritten.
+    A starter file is commented and runs as it is. Existing files are never overwritten.
     """
 
 
@@ -26,24 +28,24 @@ def new() -> None:
 def material(
     name: str = NAME,
     out: Path = OUT,
-    like: str | None = typer.Option(None, metavar="MATERIAL", help="It starts as this one: name or file."),
+    like: str | None = typer.Option(None, metavar="MATERIAL", help="Material to start from: file or shipped name."),
     part: list[Path] = typer.Option(
-        [], metavar="PART.toml", help="Measured parameters, from `explorer lab --out`; repeatable."
+        [], metavar="PART.toml", help="Measured parameters from `explorer lab --out`; repeatable."
     ),
     from_liggghts: Path | None = typer.Option(
-        None, metavar="FILE", help="From a LIGGGHTS input script: property/global, particletemplate."
+        None, metavar="FILE", help="LIGGGHTS input script to read: property/global, particletemplate."
     ),
     from_yade: Path | None = typer.Option(
-        None, metavar="FILE", help="From a YADE script, which is read, not run: FrictMat, sphere."
+        None, metavar="FILE", help="YADE script to read (it is not run): FrictMat, sphere."
     ),
     from_edem: Path | None = typer.Option(
-        None, metavar="FILE", help="From a table of EDEM's values, or a folder of `export --to edem`."
+        None, metavar="FILE", help="Table of EDEM values to read, or folder of `explorer export --to edem`."
     ),
 ) -> None:
     """Write NAME.toml, a material.
 
-    From another program's input, how numbers were converted, what was not taken and what is assumed is told, and stands
-    at the top of the file.
+    When another program's input is read, the conversions, omissions and assumptions are printed and written at the top
+    of the file.
     """
     inputs = {"liggghts": from_liggghts, "yade": from_yade, "edem": from_edem}
     given = {program: file for program, file in inputs.items() if file is not None}
@@ -72,11 +74,13 @@ def material(
 def study(
     name: str = NAME,
     out: Path = OUT,
-    material: str | None = typer.Option(None, help="Name or file; by default NAME.toml, written if missing."),
+    material: str | None = typer.Option(
+        None, metavar="MATERIAL", help="Material: file or shipped name; by default NAME.toml, written if missing."
+    ),
 ) -> None:
     """Write NAME_study.toml, a study.
 
-    And NAME.toml, its material, where that is missing. A NAME that ends in _study means the same.
+    Its material, NAME.toml, is also written if it is missing. NAME may be given with or without _study.
     """
     from explorer.scene.starter_files import STUDY_ENDING, write_study
 
@@ -89,11 +93,13 @@ def study(
 def project(
     name: str = FOLDER,
     out: Path = OUT,
-    material: str | None = typer.Option(None, help="Name or file; by default a starter, written into the folder."),
+    material: str | None = typer.Option(
+        None, metavar="MATERIAL", help="Material: file or shipped name; by default a starter, written into the folder."
+    ),
 ) -> None:
-    """Make a folder for `explorer serve`.
+    """Make a project folder for `explorer serve`.
 
-    It holds a material, a study and project.toml, and keeps what comes out of them.
+    It contains a material, a study and project.toml, and stores their results.
     """
     from explorer.project.project import new_project
 
@@ -105,47 +111,58 @@ def measurement(
     name: str = FOLDER,
     out: Path = OUT,
     study: str | None = typer.Option(
-        None, help="Study whose material, set-up and factors the data belong to; or --material."
+        None,
+        metavar="STUDY",
+        help="Study whose material, set-up and factors apply to the data: file or shipped name.",
     ),
-    material: str | None = typer.Option(None, help="Material of the data: name or file."),
+    material: str | None = typer.Option(
+        None, metavar="MATERIAL", help="Material of the data, instead of --study: file or shipped name."
+    ),
     set_: list[str] = typer.Option(
-        [], "--set", metavar="PATH=VALUE", help="Set-up of the condition, rig.… and insertion.…; repeatable."
+        [],
+        "--set",
+        metavar="PATH=VALUE",
+        help="Set a parameter of the condition's set-up (rig.…, insertion.…); repeatable.",
     ),
-    condition: str = typer.Option("A", metavar="NAME", help="Condition that the files are of."),
-    role: Literal["fit", "holdout"] | None = typer.Option(None, help="Of the condition; proposed if not given."),
+    condition: str = typer.Option("A", metavar="NAME", help="Condition to which the files belong."),
+    role: Literal["fit", "holdout"] | None = typer.Option(None, help="Role of the condition; by default proposed."),
     photo: list[str] = typer.Option(
         [],
         metavar="FILE",
-        help="Photograph of the next pour's pile (or a shipped one's name), or of a drum's face; repeatable.",
+        help="Photograph of a pile (file or shipped name) or of a drum's face, one per pour; repeatable.",
     ),
-    scale: float | None = typer.Option(None, metavar="MM_PER_PX", help="Pixel of the photographs."),
-    angles: str | None = typer.Option(
-        None, metavar="A,B,…|FILE.csv[:COLUMN]", help="Angles in degrees, one for each pour."
-    ),
+    scale: float | None = typer.Option(None, metavar="MM_PER_PX", help="Length of a pixel of the photographs [mm]."),
+    angles: str | None = typer.Option(None, metavar="A,B,…|FILE.csv[:COLUMN]", help="Angles [°], one per pour."),
     balance: list[Path] = typer.Option(
-        [], metavar="FILE.csv", help="time_s and mass_g of a balance, a file for each pour."
+        [], metavar="FILE.csv", help="Balance readings (time_s, mass_g), one file per pour; repeatable."
     ),
     starts: list[float] = typer.Option(
-        [], metavar="S", help="When the flow began on the balance's clock: one for all files, or one for each."
+        [],
+        metavar="S",
+        help="Start of the flow on the balance's clock [s], one for all files or one per file; repeatable.",
     ),
-    lag: float | None = typer.Option(None, min=0.0, metavar="S", help="Lag of the balance, to be taken off its times."),
-    scan: list[Path] = typer.Option([], metavar="FILE", help="Scan of the next pour's pile; repeatable."),
+    lag: float | None = typer.Option(
+        None, min=0.0, metavar="S", help="Lag of the balance [s], subtracted from its times."
+    ),
+    scan: list[Path] = typer.Option([], metavar="FILE", help="Scan of a pile, one per pour; repeatable."),
     scan_unit: Literal["m", "cm", "mm", "um"] = typer.Option(
         "m", help="Unit of .ply, .stl, .xyz, .txt and .csv scans."
     ),
     drum: str | None = typer.Option(
-        None, metavar="FILE.csv[:COMPONENT]", help="Sheet of `lab drum`, angles of a rotating drum."
+        None, metavar="FILE.csv[:COMPONENT]", help="Sheet of `explorer lab drum` with the angles of a rotating drum."
     ),
     uncertainty: list[str] = typer.Option(
-        [], metavar="NAME=VALUE", help="Standard deviation of one value, where one pour has no scatter."
+        [],
+        metavar="NAME=VALUE",
+        help="Standard deviation of one value of an observable, where replicates cannot give it; repeatable.",
     ),
-    json: bool = typer.Option(False, "--json", help="Print what the data can tell as plain data."),
+    json: bool = RESULT_JSON,
 ) -> None:
-    """Make a folder of measured data for `diagnose`, or add to one.
+    """Make a folder of measured data for `explorer diagnose`, or add a condition to one.
 
-    From photographs, angles, a balance's curves, scans and a drum's sheet of several pours of one condition, each kind
-    in the same order of pours. The same folder with another --condition takes one more; which one is fitted and which
-    held out is proposed, and what the data can tell is printed.
+    Takes photographs, angles, balance curves, scans and a drum's sheet from several pours of one condition, each kind
+    in the same order of pours. Another --condition for the same folder adds to it. The command proposes which condition
+    to fit and which to hold out, and prints what the data can identify.
     """
     from explorer.errors import CommandError
     from explorer.files.run_folder import json_text

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import typer
 
+from explorer.commands.shared_options import SCENE_HELP
+
 
 def parameters(
     source: str = typer.Argument(
         "sunflower_extract",
-        metavar="[MATERIAL]",
-        help="Material or study, by file or shipped name; or a rig.",
+        metavar="[RIG_OR_FILE]",
+        help=SCENE_HELP,
     ),
 ) -> None:
-    """List every parameter.
+    """List every parameter that --set, a study or a slider can change.
 
-    What --set, a study or a slider may change.
-
-    "acts": "at once" on a running pile, "on restart" with the next pour.
+    The column "acts" is "at once" if a change acts on a running pour, and "on restart" if it acts on the next pour.
     """
     from explorer.scene.file import load_scene
     from explorer.terminal.text_table import text_table

@@ -6,25 +6,27 @@ from pathlib import Path
 
 import typer
 
+from explorer.commands.shared_options import EVENTS, RIG_MATERIAL, SCENE_HELP, SCHEDULER, SET, STORE, THREADS
+
 
 def repeat(
-    source: str = typer.Argument(metavar="RIG_OR_FILE", help="As for `explorer simulate`."),
-    material: str | None = typer.Option(None, help="Material in the rig: file or shipped name."),
-    set_: list[str] = typer.Option([], "--set", metavar="PATH=VALUE", help="Set a parameter; may be repeated."),
+    source: str = typer.Argument(metavar="RIG_OR_FILE", help=SCENE_HELP),
+    material: str | None = RIG_MATERIAL,
+    set_: list[str] = SET,
     pours: int = typer.Option(
-        8, min=1, max=10_000, help="Number of pours, with seeds that the store does not hold yet."
+        8, min=1, max=10_000, metavar="N", help="Number of pours, with seeds that are not yet in the store."
     ),
-    out: Path | None = typer.Option(None, help="New folder for progress.jsonl, which the page reads, and log.jsonl."),
-    store: Path | None = typer.Option(None, help="SQLite file that keeps every pour."),
-    threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),
-    scheduler: str = typer.Option("", metavar="tcp://…", help="Pour on the workers of this Dask scheduler."),
-    json: bool = typer.Option(
-        False, "--json", "--events", help="Print events for CI, one JSON object per line, and nothing else."
+    out: Path | None = typer.Option(
+        None, metavar="DIR", help="New folder for progress.jsonl, which the page reads, and log.jsonl."
     ),
+    store: Path | None = STORE,
+    threads: int | None = THREADS,
+    scheduler: str = SCHEDULER,
+    json: bool = EVENTS,
 ) -> None:
-    """Pour a scene with more seeds, keep every pour in the store, and print what all of its seeds gave.
+    """Pour a scene with further seeds, store the pours, and print mean and SD over all seeds.
 
-    Pours that a calibration has made of exactly this scene count as well.
+    Pours that a calibration has already made of exactly this scene are included.
     """
     from explorer.background.reporter import end_as_by_ctrl_c, reporter_of
     from explorer.population.run import PoursOrder, pour_more

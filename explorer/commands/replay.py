@@ -6,17 +6,24 @@ from pathlib import Path
 
 import typer
 
+from explorer.commands.shared_options import PORT_HELP
+
 
 def replay(
-    recording: Path = typer.Argument(metavar="FILE.rrd", help="The recording."),
-    port: int = typer.Option(0, min=0, max=65535, help="Port of the page; 0 takes a free one."),
-    native: bool = typer.Option(False, "--native", help="Open the native viewer instead of a page."),
-    static: Path | None = typer.Option(None, metavar="DIR", help="Only write a folder that any web server can show."),
-    no_browser: bool = typer.Option(False, "--no-browser", help="Print the page's address, open nothing."),
+    recording: Path = typer.Argument(metavar="FILE.rrd", help="Recording to play."),
+    port: int = typer.Option(0, min=0, max=65535, help=PORT_HELP),
+    native: bool = typer.Option(False, "--native", help="Open rerun's native viewer instead of a page."),
+    static: Path | None = typer.Option(
+        None, metavar="DIR", help="Only write a new folder that any web server can serve."
+    ),
+    no_browser: bool = typer.Option(
+        False, "--no-browser", help="Print the address of the page without opening a browser."
+    ),
 ) -> None:
     """Play a recording.
 
-    In the browser, served on 127.0.0.1 until Ctrl-C, or in rerun's native viewer; its statistics are off.
+    It is shown in the browser, served on 127.0.0.1 until Ctrl-C, or in rerun's native viewer, with rerun's usage
+    statistics switched off.
     """
     from explorer.errors import CommandError
     from explorer.files.run_folder import appearing

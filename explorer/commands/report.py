@@ -6,20 +6,22 @@ from pathlib import Path
 
 import typer
 
+from explorer.commands.shared_options import AUTHOR, NOTES
+
 
 def report(
     folders: list[Path] = typer.Argument(
         metavar="FOLDER...",
-        help="Of calibrate, diagnose, or --report of another command; or a project, for all of its.",
+        help="Output folder of calibrate or diagnose, folder of --report, or project (all of its folders).",
     ),
     out: Path = typer.Option(..., metavar="DIR", help="New folder for the report, its figures and data."),
-    title: str = typer.Option("", metavar="TEXT", help="Of the report; that of the last stage if not given."),
-    author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
-    notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
+    title: str = typer.Option("", metavar="TEXT", help="Title of the report; by default that of the last stage."),
+    author: str = AUTHOR,
+    notes: str = NOTES,
 ) -> None:
-    """Join an audit, photographs, bench tests, designs, calibration and diagnosis in one report.
+    """Join the results of an audit, photographs, bench tests, designs, calibration and diagnosis in one report.
 
-    Of one folder the report is made again, with today's figures.
+    The report of a single folder is remade with the figures of this version of the program.
     """
     from explorer.files.output_file import check_vacant
     from explorer.files.run_folder import appearing

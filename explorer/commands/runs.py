@@ -7,13 +7,15 @@ from pathlib import Path
 
 import typer
 
+from explorer.commands.shared_options import STORE
+
 
 def runs(
     csv: bool = typer.Option(False, "--csv", help="Write every run as CSV to standard output."),
-    study: str | None = typer.Option(None, help="Only the runs of this study."),
-    store: Path | None = typer.Option(None, help="SQLite file that keeps the runs."),
+    study: str | None = typer.Option(None, metavar="NAME", help="Only the runs of this study."),
+    store: Path | None = STORE,
 ) -> None:
-    """List or export the stored runs, with the readings of this version of the program."""
+    """List or export the stored runs, as read by this version of the program."""
     from doe.store import Store, StoreError, default_store, observables_in_rig, observables_of, write_csv
     from explorer.errors import CommandError
     from explorer.terminal.text_table import text_table

@@ -35,12 +35,12 @@ class Files(Listing):
 
 
 def schema(
-    kind: str = typer.Argument(metavar="KIND", help="One of the files below."),
-    out: Path | None = typer.Option(None, metavar="FILE", help="Write it here instead of printing it."),
+    kind: str = typer.Argument(metavar="KIND", help="Kind of file from the list below."),
+    out: Path | None = typer.Option(None, metavar="FILE", help="File to write the schema to instead of printing it."),
 ) -> None:
-    """Write the JSON Schema of a TOML file, or of the events that a long command prints with --json.
+    """Write the JSON Schema of a TOML file or of the progress events of a long command.
 
-    An editor with a TOML language server (taplo, Even Better TOML) completes and checks keys by it where the file
+    An editor with a TOML language server (taplo, Even Better TOML) uses it to complete and check keys in a file that
     begins with the line: #:schema FILE
     """
     from explorer.errors import CommandError

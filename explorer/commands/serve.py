@@ -6,40 +6,43 @@ from pathlib import Path
 
 import typer
 
-HOST = typer.Option("127.0.0.1", help="Address to listen on; one that others can reach needs a token.")
-TOKEN = typer.Option(
-    None,
-    envvar="EXPLORER_TOKEN",
-    help="What a browser has to show, 16 characters or more. On the command line other users of this machine can "
-    "read it: better in the environment.",
-)
-"""Of every command that opens a page."""
+from explorer.commands.shared_options import HOST, PORT, SET, STORE, TOKEN
 
 
 def serve(
-    project: Path | None = typer.Argument(None, help="Folder of a project, as `explorer new project` makes it."),
-    port: int = typer.Option(8080, min=0, max=65535, help="Port of the page; 0 takes a free one."),
+    project: Path | None = typer.Argument(
+        None, metavar="[PROJECT]", help="Project folder, as made by `explorer new project`."
+    ),
+    port: int = PORT,
     host: str = HOST,
     token: str | None = TOKEN,
-    study: str | None = typer.Option(None, help="Study for the page's calibration: file or shipped name."),
-    material: str | None = typer.Option(None, help="Material to pour and calibrate: file or shipped name."),
-    set_: list[str] = typer.Option([], "--set", metavar="PATH=VALUE", help="Set a parameter; may be repeated."),
-    seed: int | None = typer.Option(None, min=0, help="Seed of the first pour; 1 if not given."),
-    store: Path | None = typer.Option(None, help="SQLite file that keeps the runs of the page's calibration."),
+    study: str | None = typer.Option(
+        None,
+        metavar="STUDY",
+        help="Study for the page's calibration: file or shipped name; by default sunflower_extract.",
+    ),
+    material: str | None = typer.Option(
+        None, metavar="MATERIAL", help="Material to pour and calibrate: file or shipped name."
+    ),
+    set_: list[str] = SET,
+    seed: int | None = typer.Option(None, min=0, help="Seed of the first pour; by default 1."),
+    store: Path | None = STORE,
     record: Path | None = typer.Option(
         None,
         metavar="FILE.rrd",
-        help="Record the session: the first pour here, the k-th in FILE_k.rrd. Ctrl-C names them.",
+        help="New recording of the session: the first pour in FILE.rrd, the k-th in FILE_k.rrd; listed on exit.",
     ),
     rerun: str | None = typer.Option(
-        None, metavar="URL", help="Send the session to a running rerun viewer: `rerun` tells its URL."
+        None, metavar="URL", help="Send the session to a running rerun viewer; `rerun` prints its URL."
     ),
     scheduler: str = typer.Option(
-        "", metavar="tcp://…", help="Studies, diagnoses and further pours on the workers of this Dask scheduler."
+        "", metavar="tcp://…", help="Run studies, diagnoses and further pours on the workers of this Dask scheduler."
     ),
-    replay: Path | None = typer.Option(None, metavar="FILE.rrd", help="Play a recording on the page instead."),
+    replay: Path | None = typer.Option(
+        None, metavar="FILE.rrd", help="Play this recording on the page instead of pouring."
+    ),
 ) -> None:
-    """Open the page: watch a pour, turn its parameters, calibrate; or play a recording."""
+    """Open the live page: watch a pour, change its parameters, calibrate and diagnose; or play a recording."""
     from explorer.errors import CommandError
     from explorer.project.project import load_project, material_project, study_project
     from explorer.scene.file import DEFAULT_STUDY, with_settings

@@ -8,25 +8,36 @@ import typer
 
 
 def shape(
-    file: Path = typer.Argument(metavar="FILE", help="STL, OBJ, PLY or GLB of a closed surface, or several of them."),
-    spheres: int | None = typer.Option(None, help="Take this number of spheres."),
+    file: Path = typer.Argument(metavar="FILE", help="STL, OBJ, PLY or GLB file of one or more closed surfaces."),
+    spheres: int | None = typer.Option(None, metavar="N", help="Use this number of spheres."),
     error: str | None = typer.Option(
-        None, metavar="LENGTH", help="Take the fewest spheres with at most this RMS distance, such as 0.2mm."
+        None,
+        metavar="LENGTH",
+        help="Use the fewest spheres with at most this RMS distance from the mesh, such as 0.2mm.",
     ),
     density: str | None = typer.Option(
-        None, help="Density of the printed and saved mass; by default 1000 kg/m3. In a scene it is the material's."
+        None,
+        metavar="DENSITY",
+        help="Density for the printed and saved mass; by default 1000 kg/m3. A scene uses the density of its material.",
     ),
-    name: str | None = typer.Option(None, help="Name of the body; by default that of the file."),
-    unit: str | None = typer.Option(None, help="Unit of the coordinates: m, cm, mm or um; by default mm, in GLB m."),
-    out: Path | None = typer.Option(None, metavar="BODY.toml", help="New file that a material file can take in."),
-    most: int = typer.Option(64, help="Largest number of spheres in the table."),
+    name: str | None = typer.Option(None, metavar="NAME", help="Name of the body; by default that of the file."),
+    unit: str | None = typer.Option(
+        None, metavar="UNIT", help="Unit of the coordinates: m, cm, mm or um; by default mm, for GLB m."
+    ),
+    out: Path | None = typer.Option(
+        None, metavar="BODY.toml", help="New file for the body, which a material file can use."
+    ),
+    most: int = typer.Option(64, metavar="N", help="Largest number of spheres in the table."),
     smallest: float = typer.Option(
-        0.5, help="Smallest sphere relative to the largest that fits into the mesh; it rules the time step."
+        0.5,
+        help="Radius of the smallest sphere over that of the largest that fits into the mesh (0.1 … 1); it limits the "
+        "time step.",
     ),
 ) -> None:
-    """Make the member spheres of a mesh.
+    """Fit the member spheres of a body to a mesh.
 
-    Prints how far they are from it by their number, and saves the body.
+    Prints their distance from the mesh for each number of spheres and, with --out, saves the body. Without --spheres
+    and --error the number is chosen as for spheres = "standard" in a material file.
     """
     from explorer.shape import ShapeOrder, run_shape
     from solver import parse_quantity

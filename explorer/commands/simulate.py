@@ -9,6 +9,7 @@ from pathlib import Path
 import typer
 
 from explorer.commands.listing import Listing
+from explorer.commands.shared_options import EVENTS_HELP, RESULT_JSON, RIG_MATERIAL, SCHEDULER, SET, THREADS
 
 
 class Rigs(Listing):
@@ -17,7 +18,7 @@ class Rigs(Listing):
     heading = "Rigs and bench tests"
 
     def listed(self) -> Iterable[tuple[str, str]]:
-        """With the first sentence of the file of each."""
+        """Each with the first sentence of its module."""
         from solver.rigs import BENCH_RIGS, RIGS
 
         for name, kind in (*RIGS.items(), *BENCH_RIGS.items()):
@@ -28,28 +29,32 @@ class Rigs(Listing):
 def simulate(
     source: str = typer.Argument(
         metavar="RIG_OR_FILE",
-        help="A rig or bench test of those below, or a material, set-up or study, by file or shipped name.",
+        help="Name of a rig or bench test from the list below, or file or shipped name of a material, set-up or study.",
     ),
-    material: str | None = typer.Option(None, help="Material in the rig: file or shipped name."),
-    set_: list[str] = typer.Option([], "--set", metavar="PATH=VALUE", help="Set a parameter; may be repeated."),
+    material: str | None = RIG_MATERIAL,
+    set_: list[str] = SET,
     seed: int = typer.Option(1, min=0, help="Seed of the first pour."),
-    replicates: int = typer.Option(1, min=1, max=10_000, help="Number of pours, with seeds SEED, SEED + 1, …"),
-    threads: int | None = typer.Option(None, min=1, help="Pours at the same time; one per core if not given."),
-    scheduler: str = typer.Option("", metavar="tcp://…", help="Pour on the workers of this Dask scheduler."),
-    out: Path | None = typer.Option(None, help="New folder for result.json, curves, piles and parameters."),
+    replicates: int = typer.Option(
+        1, min=1, max=10_000, metavar="N", help="Number of pours, with seeds SEED, SEED + 1, …"
+    ),
+    threads: int | None = THREADS,
+    scheduler: str = SCHEDULER,
+    out: Path | None = typer.Option(
+        None, metavar="DIR", help="New folder for result.json, curves, piles and parameters."
+    ),
     record: Path | None = typer.Option(
-        None, metavar="FILE.rrd", help="New recording; FILE_<seed>.rrd for several pours."
+        None, metavar="FILE.rrd", help="New recording; with several pours, one FILE_<seed>.rrd each."
     ),
     checkpoint: Path | None = typer.Option(
-        None, metavar="FILE.npz", help="Keep the state of the pour in this file, twice per simulated second."
+        None, metavar="FILE.npz", help="File for the state of the pour, rewritten every 0.5 s of simulated time."
     ),
-    resume: Path | None = typer.Option(None, metavar="FILE.npz", help="Go on from this checkpoint of the same scene."),
-    json: bool = typer.Option(False, "--json", help="Print the result as JSON, and nothing else."),
-    events: bool = typer.Option(
-        False, "--events", help="Print events for CI instead, one JSON object per line, as the other long commands do."
+    resume: Path | None = typer.Option(
+        None, metavar="FILE.npz", help="Continue from this checkpoint of the same scene."
     ),
+    json: bool = RESULT_JSON,
+    events: bool = typer.Option(False, "--events", help=EVENTS_HELP),
 ) -> None:
-    """Pour a scene and print what came out, or run a bench test and print what it measured beside what was put in.
+    """Pour a scene and print the results, or run a bench test and compare measured with input values.
 
     A jam, a lost body or a cut-off is an outcome, not an error: the result names it, and the exit code is 0.
     """

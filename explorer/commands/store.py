@@ -6,20 +6,21 @@ from pathlib import Path
 
 import typer
 
-app = typer.Typer(help="Look after the files that keep pours.", no_args_is_help=True)
+from explorer.commands.shared_options import STORE
+
+app = typer.Typer(help="Maintain the store of pours.", no_args_is_help=True)
 FAILURE = 1
-STORE = typer.Option(None, "--store", help="SQLite file that keeps the runs.")
-STUDY = typer.Option(..., help="Name of the study, as `explorer runs` lists it.")
+STUDY = typer.Option(..., metavar="NAME", help="Name of the study, as listed by `explorer runs`.")
 
 
 @app.callback()
 def store() -> None:
-    """Look after the files that keep pours."""
+    """Maintain the store of pours."""
 
 
 @app.command()
 def check(file: Path | None = STORE) -> None:
-    """Read every page and every raw pour; exit with 1 if something is damaged."""
+    """Check that every page and raw pour can be read; exit with 1 if anything is damaged."""
     from doe import store_upkeep
     from doe.store import default_store
 
@@ -38,11 +39,11 @@ def check(file: Path | None = STORE) -> None:
 
 @app.command()
 def export(
-    to: Path = typer.Argument(..., metavar="NEW.sqlite", help="New store for the copies."),
+    to: Path = typer.Argument(..., metavar="NEW.sqlite", help="New store file for the copies."),
     study: str = STUDY,
     file: Path | None = STORE,
 ) -> None:
-    """Copy a study's runs into a store of their own; `explorer runs --csv` writes readings as a table."""
+    """Copy a study's runs into a new store; to export readings as a table use `explorer runs --csv`."""
     from doe import store_upkeep
     from doe.store import default_store
 
@@ -52,10 +53,10 @@ def export(
 
 @app.command()
 def merge(
-    other: Path = typer.Argument(..., metavar="OTHER.sqlite", help="Store whose runs are added."),
+    other: Path = typer.Argument(..., metavar="OTHER.sqlite", help="Store file whose runs are added."),
     file: Path | None = STORE,
 ) -> None:
-    """Add the runs of another store, e.g. of another machine; what both have is kept once."""
+    """Add the runs of another store, such as another machine's; runs in both are stored once."""
     from doe import store_upkeep
     from doe.store import default_store
 
@@ -68,9 +69,11 @@ def merge(
 def prune(
     study: str = STUDY,
     file: Path | None = STORE,
-    yes: bool = typer.Option(False, "--yes", help="Remove them; without it only their number is told."),
+    yes: bool = typer.Option(
+        False, "--yes", help="Remove the runs; without this option their number is printed and nothing is removed."
+    ),
 ) -> None:
-    """Remove a study's runs and give their room on the disk back."""
+    """Remove a study's runs and free their disk space."""
     from doe import store_upkeep
     from doe.store import default_store
 

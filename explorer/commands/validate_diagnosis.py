@@ -6,30 +6,41 @@ from pathlib import Path
 
 import typer
 
+from explorer.commands.shared_options import EVENTS, SCHEDULER, STORE
+
 
 def validate_diagnosis(
-    n: int = typer.Option(370, "--n", min=1, help="Data sets; 370 are a whole test."),
-    root: int = typer.Option(1, "--root", min=1, help="Root of all random numbers: another root, other data sets."),
+    n: int = typer.Option(370, "--n", min=1, metavar="N", help="Number of data sets; 370 make a complete test."),
+    root: int = typer.Option(
+        1, "--root", min=1, metavar="N", help="Root of all random numbers; another root gives other data sets."
+    ),
     laboratory: Path | None = typer.Option(
         None,
         metavar="FILE",
-        help="What it declares and hands out (doe/validation/laboratory.py); the shipped one if not given.",
+        help="File of a made-up laboratory (doe/validation/laboratory.py); by default the shipped one.",
     ),
-    out: Path = typer.Option(Path("validation"), help="Folder for sets.jsonl, two lines per data set."),
+    out: Path = typer.Option(Path("validation"), metavar="DIR", help="Folder for sets.jsonl, two lines per data set."),
     minutes: float | None = typer.Option(
-        None, min=0.0, help="Stop after so long; the same command goes on. 0: only the table of what is there."
+        None,
+        min=0.0,
+        metavar="MINUTES",
+        help="Stop after this time [min]; the same command continues. 0 only prints the table of finished data sets.",
     ),
-    shard: str = typer.Option("1/1", metavar="K/N", help="Only every N-th set; N processes may share OUT and a store."),
-    wide: bool = typer.Option(False, "--wide", help="Effects of 4 to 40 σ, for development."),
+    shard: str = typer.Option(
+        "1/1",
+        metavar="K/N",
+        help="Process only every N-th data set, from the K-th on; N processes can share --out and --store.",
+    ),
+    wide: bool = typer.Option(False, "--wide", help="Data sets with effects of 4 to 40 σ, for development."),
     follow_up: bool = typer.Option(
-        True, "--follow-up/--no-follow-up", help="Carry out the experiment that an ambiguous answer asks for."
+        True, "--follow-up/--no-follow-up", help="Carry out the experiment requested by an ambiguous answer."
     ),
-    store: Path | None = typer.Option(None, help="SQLite file that keeps every pour."),
-    threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),
-    scheduler: str = typer.Option("", metavar="tcp://…", help="Pour on the workers of this Dask scheduler."),
-    json: bool = typer.Option(
-        False, "--json", "--events", help="Print events for CI, one JSON object per line, and nothing else."
+    store: Path | None = STORE,
+    threads: int | None = typer.Option(
+        None, min=1, metavar="N", help="Processes on this machine; by default one per CPU core."
     ),
+    scheduler: str = SCHEDULER,
+    json: bool = EVENTS,
 ) -> None:
     """Diagnose made-up data with known truths and print how often the answer is right."""
     import math

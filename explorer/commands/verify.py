@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from explorer.commands.shared_options import STORE_HELP
+
 if TYPE_CHECKING:
     from solver.verification import Row
 
@@ -17,33 +19,48 @@ USUAL_LIMIT = 120.0
 
 
 def verify(
-    only: list[str] = typer.Option([], metavar="NAME", help="Run only this part, e.g. T4; may be repeated."),
-    json: Path | None = typer.Option(None, "--json", metavar="FILE", help="Write every row to this file."),
-    every: bool = typer.Option(False, "--all", help="Print every point, not only the furthest of each curve."),
+    only: list[str] = typer.Option([], metavar="NAME", help="Run only this test, such as T4; repeatable."),
+    json: Path | None = typer.Option(None, "--json", metavar="FILE", help="File for every row of the table."),
+    every: bool = typer.Option(
+        False, "--all", help="Print every point, not only the one with the largest error on each curve."
+    ),
     peers: bool = typer.Option(
         False,
         "--peers",
-        help="Run T4, T5, T6, T8 in LIGGGHTS and by its law, beside what ours misses.",
+        help="Also run T4, T5, T6 and T8 in LIGGGHTS, and here with its tangential law, beside the points that miss "
+        "their limit.",
     ),
     peer_limit: float | None = typer.Option(
-        None, metavar="S", help="With --peers: wall time after which a run of LIGGGHTS is stopped [s]; 120.", min=1.0
+        None,
+        metavar="S",
+        help="With --peers: wall time after which a run of LIGGGHTS is stopped [s]; by default 120.",
+        min=1.0,
     ),
     economy: str | None = typer.Option(
-        None, metavar="STUDY", help="Compare piles with and without an economy of the method, for this study instead."
+        None,
+        metavar="STUDY",
+        help="Instead, test for this study whether piles with and without an economy of the method are equivalent.",
     ),
-    change: str | None = typer.Option(None, metavar="NAME", help="With --economy: which one; larger_steps by default."),
+    change: str | None = typer.Option(
+        None, metavar="NAME", help="With --economy: name of the economy; by default larger_steps."
+    ),
     profile: str | None = typer.Option(
-        None, help="With --economy: shapes and mass of this profile of the study; standard by default."
+        None,
+        metavar="NAME",
+        help="With --economy: profile of the study that gives shapes and mass; by default standard.",
     ),
     pours: int | None = typer.Option(
-        None, min=2, help="With --economy: pours of each kind at each of three settings; 241 by default."
+        None,
+        min=2,
+        metavar="N",
+        help="With --economy: pours with and without it at each of three settings; by default 241 each.",
     ),
-    store: Path | None = typer.Option(None, metavar="FILE", help="With --economy: where pours are kept."),
+    store: Path | None = typer.Option(None, metavar="FILE", help=f"With --economy: {STORE_HELP}"),
 ) -> None:
-    """Check the solver against known answers.
+    """Check the solver against known solutions.
 
-    Chung & Ooi (2011) T1 to T8, restitution and invariants. Exit code 0 if every limit is kept, 1 if not; a row
-    without a limit is shown for comparison. With --peers the exit code is still that of our rows.
+    These are tests T1 to T8 of Chung & Ooi (2011), restitution and conservation laws. The exit code is 0 if every limit
+    is met and 1 if not; rows without a limit are shown for comparison. The results of --peers do not change it.
     """
     from explorer.errors import CommandError
 

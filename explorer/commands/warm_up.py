@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from explorer.commands.shared_options import SCENE_HELP
+
 if TYPE_CHECKING:
     from solver import Scene
 
@@ -19,11 +21,13 @@ def warm_up(
     sources: list[str] = typer.Argument(
         None,
         metavar="[RIG_OR_FILE]...",
-        help="What is to be poured, as for simulate; without it, all that is shipped: rigs, study and diagnoses.",
+        help=f"{SCENE_HELP} By default the shipped rigs, study and diagnoses.",
     ),
-    threads: int | None = typer.Option(None, min=1, help="CPU threads; all by default."),
+    threads: int | None = typer.Option(
+        None, min=1, metavar="N", help="Number of simultaneous compilations; by default one per CPU core."
+    ),
 ) -> None:
-    """Compile the solver now: later commands find it compiled. What is compiled already is left as it is."""
+    """Compile the solver in advance, so that later commands need not; existing compiled kernels are kept."""
     from explorer.errors import CommandError
     from solver import warm_up as compiled
     from solver.arch import chosen
