@@ -111,6 +111,9 @@ def test_missing_rows_and_replicates_agree_with_statsmodels():
     assert screening.missing_rows == (4, 20)
     assert screening.dummy_error.df == 1
     assert screening.pure_error.df == 26 * 2 - 1
+    poured = np.delete(values, [4, 20], axis=0)
+    squares = np.nansum((poured - np.nanmean(poured, axis=1, keepdims=True)) ** 2)
+    assert screening.pure_error.sigma == pytest.approx(math.sqrt(squares / 51))
     assert screening.runs == 77
     assert math.isnan(by_name(screening)["D1"].effect)
     assert "Rows 5, 21" in screening.notes[0]
