@@ -10,7 +10,6 @@ from scipy import stats
 
 from doe.declared.model import CalibratedParameter, CandidateEffect, Declared
 from doe.diagnose.confirm import CONTRADICTED, Confirmed, confirming, held_out, model_of, residual_maps
-from doe.diagnose.posterior import Fit
 from doe.diagnose.result import Amplitude, CalibratedModel
 from doe.holdout import MeasuredReplicates
 from doe.measurement import load_measurement
@@ -86,8 +85,7 @@ def test_a_model_is_poured_within_its_ranges():
     declared = Declared((CalibratedParameter("friction", 0.0, 1.0, 0.5, 0.2),), effects, ())
     values = (("plate_tilt", 0, -1.8), ("plate_tilt", 1, 0.7), ("air_drag", 0, 2.6))
     amplitudes = tuple(Amplitude(name, index, value, value, value, False) for name, index, value in values)
-    none = np.zeros(0)
-    fit = Fit("", amplitudes, np.array([3.0]), np.eye(1), none, none, none, 0.0, 0.5)
+    fit = SimpleNamespace(amplitudes=amplitudes, theta=np.array([3.0]))
     assert model_of(fit, declared) == CalibratedModel((1.0,), (("plate_tilt", (-1.5, 0.7)), ("air_drag", (2.0,))))
 
 
