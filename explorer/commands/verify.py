@@ -27,8 +27,8 @@ def verify(
     peers: bool = typer.Option(
         False,
         "--peers",
-        help="Also run T4, T5, T6 and T8 in LIGGGHTS, and here with its tangential law, beside the points that miss "
-        "their limit.",
+        help="Also run T4, T5, T6 and T8 in LIGGGHTS, and here with its tangential law, and print their values at the "
+        "points that miss their limit.",
     ),
     peer_limit: float | None = typer.Option(
         None,
