@@ -1,7 +1,7 @@
 """Which pours a diagnosis asks for: they belong to the declared model and its rigs, not to one data set.
 
 A point is one setting with a number in a fixed sequence, so that the same model asks for the same pours again, and more
-pours continue a sequence instead of beginning another. In all sequences that teach, parameters are moved by one
+pours continue a sequence instead of beginning another. In the sequences that teach, parameters are moved by one
 deviation to either side, by the Walsh functions of the number: over every four (of three parameters) each is at either
 side as often, and no two go together, so what parameters do costs no pours of its own.
 
@@ -60,6 +60,8 @@ class View:
 
 
 AS_IT_IS = View()
+BASE = "base"
+"""Sequence of the base model."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +133,16 @@ def _walsh(number: int, mask: int) -> float:
 
 def base_points(declared: Declared, number: int, first: int = 0) -> list[Point]:
     """Pours ``first`` … ``number`` − 1 of the base model."""
-    return [Point("base", k, moved(declared, k)) for k in range(first, number)]
+    return [Point(BASE, k, moved(declared, k)) for k in range(first, number)]
+
+
+def far_points(declared: Declared, parameter: int, theta: float, number: int) -> list[Point]:
+    """``number`` pours of the base model with ``parameter`` at ``theta`` deviations off its middle, within its range:
+    what moves by one to either side does not tell how bent an answer is.
+    """
+    name, natural = declared.parameters[parameter].name, declared.parameters[parameter].natural(theta)
+    points = [Point(f"base {name}@{natural:.6g}", k, moved(declared, k)) for k in range(number)]
+    return [dataclasses.replace(p, theta=(*p.theta[:parameter], natural, *p.theta[parameter + 1 :])) for p in points]
 
 
 def effect_points(declared: Declared, direction: Direction, share: float, number: int, first: int = 0) -> list[Point]:

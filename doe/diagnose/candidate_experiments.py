@@ -153,16 +153,16 @@ def _item(
         slope = emulator.squashes[0].slope(emulator.squashes[0].centre)
         shared = emulator.whitening @ (axis * slope).T
     expected = {label: emulator.at(_rows(emulator, training, found, label)) for label in labels}
+    moved = {label: emulator.moved(found.fits[label].theta[None]) for label in labels}
     # How well a regression of few pours knows an answer is no property of it that would give it away, nor does it stay.
-    noise = np.mean([variance[0] for _, variance in expected.values()], axis=0) + emulator.slope_variance
-    noise *= POURS / TAUGHT
-    predictions, slopes = {}, emulator.slopes
+    noise = np.mean([expected[label][1][0] + moved[label][1][0] for label in labels], axis=0) * POURS / TAUGHT
+    predictions = {}
     for label, ((mean, *beside), _) in expected.items():
-        fit = found.fits[label]
+        (shift,), _, (slopes,) = moved[label]
         loose = np.array([one - mean for one in beside]).reshape(-1, len(mean))
-        covariance = np.diag(noise) + slopes @ fit.theta_covariance @ slopes.T
+        covariance = np.diag(noise) + slopes @ found.fits[label].theta_covariance @ slopes.T
         covariance += loose.T @ loose + shared @ shared.T
-        predictions[label] = Prediction(mean + slopes @ fit.theta, covariance)
+        predictions[label] = Prediction(mean + shift, covariance)
     return CandidateExperiment(set_up.name, predictions, np.eye(len(columns)))
 
 

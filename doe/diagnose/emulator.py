@@ -4,18 +4,18 @@ Features are whitened, z = W y with W Σ Wᵀ = I for the covariance Σ of one p
 the signatures. There a pour with parameters θ [standard deviations of their measurements] and effect e at a times its
 reference amplitude gives, feature by feature,
 
-    z = b + J θ + β_e a + γ_e (a² − a) + ε,    ε ~ N(0, 1 + x_e a)
-    b, J flat,    β_e ~ N(0, v),    γ_e ~ N(0, CURVATURE² v)
+    z = b + J θ + Q (θ² − 1) + β_e a + γ_e (a² − a) + ε,    ε ~ N(0, 1 + x_e a)
+    b, J flat,    Q ~ N(0, BEND² J²),    β_e ~ N(0, v),    γ_e ~ N(0, CURVATURE² v)
 
-b is the base model, J what parameters do, β_e a signature, γ_e how far the answer is from proportional, x_e by how much
-an effect makes pours scatter more (one number for all features; bodies that stick come down in lumps). All pours are
-in one regression: parameters are moved in every one of them, the base model is known better by what the effects do not
-move, and the errors that two models share are in both. What a signature may be is learned from all of them (v, one
-variance along each principal axis): effects of a granular pour move its features along few directions, and what a
-handful of pours shows in the others is mostly their scatter (empirical Bayes; Efron & Morris 1973,
-doi 10.1080/01621459.1973.10481350). Of an eigenvalue of the signatures' scatter only what exceeds the largest that
-noise alone makes, n (1 + √(D/m))² for m signatures of noise n in D features, counts (Marchenko & Pastur 1967,
-doi 10.1070/SM1967v001n04ABEH001994).
+b is the base model, J what parameters do and Q how far that is from proportional, β_e a signature, γ_e how far the
+answer is from proportional, x_e by how much an effect makes pours scatter more (one number for all features; bodies
+that stick come down in lumps). All pours are in one regression: parameters are moved in every one of them, the base
+model is known better by what the effects do not move, and the errors that two models share are in both. What a
+signature may be is learned from all of them (v, one variance along each principal axis): effects of a granular pour
+move its features along few directions, and what a handful of pours shows in the others is mostly their scatter
+(empirical Bayes; Efron & Morris 1973, doi 10.1080/01621459.1973.10481350). Of an eigenvalue of the signatures' scatter
+only what exceeds the largest that noise alone makes, n (1 + √(D/m))² for m signatures of noise n in D features, counts
+(Marchenko & Pastur 1967, doi 10.1070/SM1967v001n04ABEH001994).
 
 Before all this each feature x of a pour becomes  s asinh((x − x̄)/(s σ)),  s = ``SQUASH``: counts and masses that are
 zero in most pours of the base model reach hundreds of its variances under an effect.
@@ -33,6 +33,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from doe.analysis.covariance import pooled_slopes, residuals_within, shrunk_covariance
 from doe.errors import StatisticsError
 
 FloatArray = npt.NDArray[np.float64]
@@ -40,6 +41,9 @@ FloatArray = npt.NDArray[np.float64]
 CURVATURE = 0.5
 """Expected share by which the answer at twice an amplitude is off twice the answer; of the reference pours of
 ``docs/limit.md`` half an amplitude gives 0.2 to 0.65 of a shift (mean 0.45)."""
+BEND = 0.25
+"""The same of a parameter. By the reference pours that of restitution is 0.2, and those of frictions are too small to
+be told."""
 SQUASH = 2.0
 """Standard deviations of a pour up to which a feature counts in full."""
 FLOOR = 0.3
@@ -164,7 +168,7 @@ class Emulator:
     parameters
         k.
     mean, covariance
-        Of the coefficients (b, J, β_1 … β_m, γ_1 … γ_m) of every feature: (D, 1 + k + 2m) and, squared, (D, …, …).
+        Of the coefficients (b, J, β_1 … β_m, γ_1 … γ_m, Q) of every feature: (D, 1 + 2k + 2m) and, squared, (D, …, …).
     freedom
         Degrees of freedom of Σ.
     squashes, whitening
@@ -203,10 +207,17 @@ class Emulator:
         return self.mean[:, 1 : 1 + self.parameters]
 
     @property
-    def slope_variance(self) -> FloatArray:
-        """What the errors of J add to the variance of z where θ ~ N(0, I), (D,)."""
-        places = np.arange(1, 1 + self.parameters)
-        return np.asarray(self.covariance[:, places, places].sum(axis=1), dtype=np.float64)
+    def bends(self) -> FloatArray:
+        """Q, (D, k)."""
+        return self.mean[:, 1 + self.parameters + 2 * len(self.ways) :]
+
+    def moved(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """What parameters ``theta`` (n, k) do and its variance, (n, D), and by which slopes, (n, D, k)."""
+        own, first = np.diagonal(self.covariance, axis1=1, axis2=2), 1 + self.parameters + 2 * len(self.ways)
+        # Of J that of θ ~ N(0, I), so that no model gains by a small θ.
+        variance = own[:, 1 : 1 + self.parameters].sum(axis=1) + (theta**2 - 1.0) ** 2 @ own[:, first:].T
+        slopes = self.slopes + 2.0 * theta[:, None, :] * self.bends
+        return theta @ self.slopes.T + (theta**2 - 1.0) @ self.bends.T, variance, slopes
 
     def row(self, acting: Mapping[int, float] | None = None) -> FloatArray:
         """The row of the regression in which ways act at amplitudes ``acting``, parameters at their means."""
@@ -215,7 +226,7 @@ class Emulator:
     def weighted_row(self, acting: Sequence[tuple[Mapping[int, float], float]]) -> FloatArray:
         """The row in which weighted means of ways act at an amplitude each."""
         first, m = 1 + self.parameters, len(self.ways)
-        row = np.zeros(first + 2 * m)
+        row = np.zeros(self.mean.shape[1])
         row[0] = 1.0
         for weights, a in acting:
             for way, weight in weights.items():
@@ -284,7 +295,8 @@ def emulated(
     drawn_in = [squash(block) for squash, block in zip(squashes, lessons.blocks, strict=True)]
     whitening, freedom = _whitening([block[lessons.own] for block in drawn_in], own, weights)
     z = np.concatenate(drawn_in, axis=1) @ whitening.T
-    shift = z - lessons.theta @ _pooled_slopes(z, lessons.groups(), lessons.theta)
+    slopes = pooled_slopes(z, lessons.groups(), lessons.theta)
+    shift = z - lessons.theta @ slopes
     shift -= shift[base].mean(axis=0)
     # a β_e of least squares through the origin, way by way, and the variance of its noise.
     square = np.array([(lessons.amplitude[lessons.way == w] ** 2).sum() for w in range(m)])
@@ -295,15 +307,15 @@ def emulated(
     scales = signature_scales(signatures @ axes, noise, variances) if m else np.zeros(0)
     if not shrunk:
         variances, scales = np.full_like(variances, variances.sum()), np.ones(m)
-    rows = np.zeros((len(lessons), 1 + k + 2 * m))
-    rows[:, 0], rows[:, 1 : 1 + k] = 1.0, lessons.theta
+    rows = np.zeros((len(lessons), 1 + 2 * k + 2 * m))
+    rows[:, 0], rows[:, 1 : 1 + k], rows[:, 1 + k + 2 * m :] = 1.0, lessons.theta, lessons.theta**2 - 1.0
     acting = np.flatnonzero(~base)
     a = lessons.amplitude[acting]
     rows[acting, 1 + k + lessons.way[acting]] = a
     rows[acting, 1 + k + m + lessons.way[acting]] = a**2 - a
     excess = _excess(z, lessons, m)
     spread = np.sqrt(noise_of(rows[:, 1 + k : 1 + k + m], excess))[:, None]
-    mean, covariance = regression(rows / spread, z @ axes / spread, k, variances, scales)
+    mean, covariance = regression(rows / spread, z @ axes / spread, (slopes**2).mean(axis=1), variances, scales)
     reached = tuple(float(lessons.amplitude[lessons.way == w].max()) for w in range(m))
     return Emulator(tuple(ways), k, mean, covariance, freedom, squashes, axes.T @ whitening, reached, excess)
 
@@ -317,7 +329,7 @@ def _excess(z: FloatArray, lessons: Lessons, ways: int) -> FloatArray:
     """x (m,) by least squares of the pours' squared deviations within their groups, drawn towards 0."""
     group = lessons.groups()
     several = (np.bincount(group) > 1)[group]
-    square = (_residuals(z, group, lessons.theta) ** 2).mean(axis=1)
+    square = (residuals_within(z, group, lessons.theta) ** 2).mean(axis=1)
     way, amplitude = lessons.way[several], lessons.amplitude[several]
     more = square / square[way == -1].mean() - 1.0
     found = np.zeros(ways)
@@ -354,24 +366,25 @@ def signature_scales(signatures: FloatArray, noise: FloatArray, variances: Float
 
 
 def regression(
-    rows: FloatArray, z: FloatArray, parameters: int, variances: FloatArray, scales: FloatArray
+    rows: FloatArray, z: FloatArray, slopes: FloatArray, variances: FloatArray, scales: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Mean (D, c) and covariance (D, c, c) of the c = 1 + k + 2m coefficients of every feature.
+    """Mean (D, c) and covariance (D, c, c) of the c = 1 + 2k + 2m coefficients of every feature.
 
     Parameters
     ----------
     rows, z
         Of each pour, (n, c) and (n, D).
-    parameters
-        k.
+    slopes
+        Mean square of J over the features, (k,).
     variances, scales
         v (D,) and s (m,).
     """
-    columns, m = rows.shape[1], len(scales)
+    columns, m, first = rows.shape[1], len(scales), 1 + len(slopes)
     precision = np.full((len(variances), columns), FLAT)
     own = 1.0 / (variances[:, None] * scales)
-    precision[:, 1 + parameters : 1 + parameters + m] = own
-    precision[:, 1 + parameters + m :] = own / CURVATURE**2
+    precision[:, first : first + m] = own
+    precision[:, first + m : first + 2 * m] = own / CURVATURE**2
+    precision[:, first + 2 * m :] = 1.0 / (BEND**2 * np.maximum(slopes, LEAST_VARIANCE))
     covariance = np.linalg.inv(rows.T @ rows + precision[:, :, None] * np.eye(columns))
     mean = np.einsum("dij,jd->di", covariance, rows.T @ z, optimize=True)
     return np.asarray(mean, dtype=np.float64), np.asarray(covariance, dtype=np.float64)
@@ -380,7 +393,7 @@ def regression(
 def _squash(own: Lessons, condition: int) -> Squash:
     """By the mean of the base model's pours, and the deviations within all groups."""
     block = own.blocks[condition]
-    deviation = np.sqrt((_residuals(block, own.groups(), own.theta) ** 2).mean(axis=0))
+    deviation = np.sqrt((residuals_within(block, own.groups(), own.theta) ** 2).mean(axis=0))
     return Squash(block[own.way == -1].mean(axis=0), np.where(deviation > 0.0, deviation, 1.0))
 
 
@@ -390,49 +403,13 @@ def _whitening(drawn_in: Sequence[FloatArray], own: Lessons, weights: Sequence[f
     white = np.zeros((sum(sizes), sum(sizes)))
     first = 0
     for c, (size, block) in enumerate(zip(sizes, drawn_in, strict=True)):
-        covariance = shrunk_covariance(_residuals(block, group, own.theta))
+        covariance = shrunk_covariance(residuals_within(block, group, own.theta))
         inverse = np.linalg.inv(np.linalg.cholesky(covariance))
         white[first : first + size, first : first + size] = inverse * np.sqrt(weights[c] if weights else 1.0)
         first += size
     several = np.bincount(group) > 1
     pours = int(several[group].sum())
     return white, max(1, pours - int(several.sum()) - own.theta.shape[1])
-
-
-def shrunk_covariance(residuals: FloatArray) -> FloatArray:
-    """Covariance of the rows (n, d), correlations shrunk to zero by λ* = Σ Var(r_ij) / Σ r_ij² over i ≠ j."""
-    n = len(residuals)
-    deviation = np.sqrt((residuals**2).mean(axis=0))
-    z = residuals / deviation
-    correlation = z.T @ z / n
-    scatter = ((z**2).T @ (z**2) / n - correlation**2) / (n - 1)
-    off = ~np.eye(z.shape[1], dtype=bool)
-    denominator = float((correlation[off] ** 2).sum())
-    share = min(1.0, float(scatter[off].sum()) / denominator) if denominator > 0.0 else 1.0
-    shrunk = np.where(off, (1.0 - share) * correlation, 1.0)
-    return np.asarray(shrunk * np.outer(deviation, deviation), dtype=np.float64)
-
-
-def _pooled_slopes(values: FloatArray, group: npt.NDArray[np.int64], theta: FloatArray) -> FloatArray:
-    """What parameters do within groups, (k, d), by least squares."""
-    inside, moved = _within(values, group), _within(theta, group)
-    return np.asarray(np.linalg.lstsq(moved, inside, rcond=None)[0], dtype=np.float64)
-
-
-def _residuals(values: FloatArray, group: npt.NDArray[np.int64], theta: FloatArray) -> FloatArray:
-    """Scatter within groups, less what parameters do, of the pours that are not alone in theirs."""
-    left = _within(values, group) - _within(theta, group) @ _pooled_slopes(values, group, theta)
-    count = np.bincount(group)[group].astype(np.float64)
-    several = count > 1
-    # Each group's mean takes a degree of freedom.
-    return np.asarray((left * np.sqrt(count / np.maximum(1.0, count - 1.0))[:, None])[several], dtype=np.float64)
-
-
-def _within(values: FloatArray, group: npt.NDArray[np.int64]) -> FloatArray:
-    count = np.bincount(group).astype(np.float64)
-    means = np.zeros((len(count), values.shape[1]))
-    np.add.at(means, group, values)
-    return np.asarray(values - (means / count[:, None])[group], dtype=np.float64)
 
 
 def _whitened(whitening: FloatArray, blocks: Sequence[FloatArray]) -> FloatArray:

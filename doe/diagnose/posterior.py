@@ -10,7 +10,8 @@ the emulator that they share (``emulator.py``), of mean m(e, a) and variance u(e
 Σ is known by ν degrees of freedom, those of all conditions together. Integrated over it, the density of D features at
 distance q is (1 + q/ν)^(−(ν+1)/2), a multivariate t of ν − D + 1 degrees of freedom (Geisser and Cornfield 1963, J. R.
 Stat. Soc. B 25:368): the more features a Σ of few pours whitens, the less a distance says. J is what a parameter does
-per standard deviation of its measurement, w the variance of what is not known of J, so parameters are integrated out. I
+per standard deviation of its measurement, w the variance of what is not known of J, so parameters are integrated out:
+about their best fit under each model, where J is the slope (Laplace), for the answer to a parameter is bent. I
 holds the stated errors of instruments, r ≥ 1 is the variance of the data's replicates over the simulated one, or that
 of pours under the effect where it is more.
 The evidence of an effect is the mean over amplitudes, evenly over their logarithm, over its signs and over its
@@ -31,6 +32,7 @@ import numpy.typing as npt
 from scipy import stats
 from scipy.special import logsumexp
 
+from doe.analysis.covariance import log_t
 from doe.diagnose.emulator import ANGLES, Emulator, planar_weights
 from doe.diagnose.result import Amplitude
 
@@ -66,6 +68,8 @@ COARSE = 3
 """Every so many amplitudes and directions of a member of a pair are summed."""
 AT_ONCE = 20_000
 """Nodes that are weighed at once."""
+STEPS, FARTHEST = 4, 4.0
+"""Steps to the best fit of the parameters, and how far from their means these may be [standard deviations]."""
 
 
 @dataclass(frozen=True)
@@ -81,13 +85,16 @@ class Data:
     scatter
         r, variance of the replicates over that of simulated pours, 1 at least.
     instrument
-        I, (D, q), or empty.
+        I, (D, q), without columns where nothing is stated.
     """
 
     z: FloatArray
     replicates: float
     scatter: float = 1.0
     instrument: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "instrument", self.instrument.reshape(len(self.z), -1))
 
 
 @dataclass(frozen=True)
@@ -100,9 +107,13 @@ class Fit:
         Of its effects, in order.
     theta, theta_covariance
         Posterior of the parameters [standard deviations of their measurements], (k,) and (k, k).
+    slopes
+        What parameters do there, (D, k).
     z, variance
         What it gives at its best amplitude and parameters, (D,), and the variance of the data about that which neither
         parameters nor instruments make.
+    still
+        What it gives at its best amplitude with the parameters at the means of their measurements, (D,).
     unsure
         The part of that variance that more pours of the model would take away, u, (D,).
     log_evidence
@@ -115,8 +126,10 @@ class Fit:
     amplitudes: tuple[Amplitude, ...]
     theta: FloatArray
     theta_covariance: FloatArray
+    slopes: FloatArray
     z: FloatArray
     variance: FloatArray
+    still: FloatArray
     unsure: FloatArray
     log_evidence: float
     p: float
@@ -266,9 +279,7 @@ def gain_by_pours(one: Fit, other: Fit, emulator: Emulator, data: Data) -> float
     covariance of the data about them; with u left out of S it is what any number of pours could make of it. Where the
     data's own noise is most of S, that is nothing.
     """
-    instrument = data.instrument if data.instrument.size else np.zeros((len(data.z), 0))
-    loadings = np.concatenate([emulator.slopes, instrument], axis=1)
-    apart = (one.z - emulator.slopes @ one.theta) - (other.z - emulator.slopes @ other.theta)
+    loadings, apart = np.concatenate([emulator.slopes, data.instrument], axis=1), one.still - other.still
     noise, unsure = 0.5 * (one.variance + other.variance), 0.5 * (one.unsure + other.unsure)
     now, then = (
         0.5 * float(apart @ np.linalg.solve(np.diag(left) + loadings @ loadings.T, apart))
@@ -353,25 +364,38 @@ class _Weigher:
     def __init__(self, emulator: Emulator, data: Data) -> None:
         self._emulator, self._data = emulator, data
         self.row = emulator.row()
-        instrument = data.instrument if data.instrument.size else np.zeros((len(data.z), 0))
-        self._loadings = np.concatenate([emulator.slopes, instrument], axis=1)
 
     def at(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Means and variances (n, D) of the data under ``rows``."""
         mean, variance = self._emulator.at(rows)
         noise = np.maximum(self._data.scatter, self._emulator.noise(rows)) / self._data.replicates
-        return mean, variance + noise[:, None] + self._emulator.slope_variance
+        return mean, variance + noise[:, None]
 
     def shifts(self, rows: FloatArray) -> FloatArray:
         """How far the data of ``rows`` are off those of the base model [standard errors], (n,)."""
         means = self._emulator.at(np.concatenate([self.row[None], rows]))[0]
         return np.asarray(np.sqrt(self._data.replicates) * np.linalg.norm(means[1:] - means[0], axis=1))
 
+    def bent(self, mean: FloatArray, variance: FloatArray) -> tuple[FloatArray, ...]:
+        """θ (n, k) by Gauss and Newton; the data less the answer there made straight, at θ = 0, its variance and the
+        answer's, (n, D); and slopes there (n, D, k).
+        """
+        theta = np.zeros((len(mean), self._emulator.parameters))
+        for _ in range(STEPS):
+            moved, unsure, slopes = self._emulator.moved(theta)
+            left = self._data.z - mean - moved + (slopes @ theta[:, :, None])[:, :, 0]
+            weighted = (slopes / (variance + unsure)[:, :, None]).swapaxes(1, 2)
+            best = np.linalg.solve(np.eye(theta.shape[1]) + weighted @ slopes, weighted @ left[:, :, None])
+            theta = np.clip(best[:, :, 0], -FARTHEST, FARTHEST)
+        return theta, left, variance + unsure, mean + moved, slopes
+
     def log_t(self, mean: FloatArray, variance: FloatArray) -> FloatArray:
         """Log densities (n,) of the data."""
         # Σ is known condition by condition, each by as many pours.
         freedom = self._emulator.freedom * len(self._emulator.squashes)
-        return log_t(self._data.z - mean, variance, self._loadings, freedom)
+        _, left, variance, _, slopes = self.bent(mean, variance)
+        instrument = np.broadcast_to(self._data.instrument, (*left.shape, self._data.instrument.shape[1]))
+        return log_t(left, variance, np.concatenate([slopes, instrument], axis=2), freedom)
 
     def densities(self, rows: FloatArray) -> FloatArray:
         """Log densities (n,) of the data under ``rows``."""
@@ -390,12 +414,9 @@ class _Weigher:
         """The model at its best node, with what all nodes say of its amplitudes."""
         best = int(logs.argmax())
         mean, noise = (one[0] for one in self.at(rows[best : best + 1]))
-        d = self._data.z - mean
-        slopes = self._emulator.slopes
-        precision = np.eye(slopes.shape[1]) + slopes.T @ (slopes / noise[:, None])
-        covariance = np.linalg.inv(precision)
-        theta = covariance @ (slopes.T @ (d / noise))
-        full = np.diag(noise) + self._loadings @ self._loadings.T
+        theta, d, noise, z, slopes = (one[0] for one in self.bent(mean[None], noise[None]))
+        covariance = np.linalg.inv(np.eye(len(theta)) + slopes.T @ (slopes / noise[:, None]))
+        full = np.diag(noise) + slopes @ slopes.T + self._data.instrument @ self._data.instrument.T
         square = float(d @ np.linalg.solve(full, d)) / len(d)
         weights = np.exp(logs - logsumexp(logs))
         owners = _owners(effects, self._emulator)
@@ -408,8 +429,10 @@ class _Weigher:
             amplitudes,
             theta,
             covariance,
-            mean + slopes @ theta,
+            slopes,
+            z,
             noise,
+            mean,
             self._emulator.at(rows[best : best + 1])[1][0],
             float(logsumexp(logs)) - math.log(len(logs)),
             float(stats.f.sf(square, len(d), self._emulator.freedom)),
@@ -427,15 +450,3 @@ def _spread_of(values: FloatArray, weights: FloatArray) -> tuple[float, float, f
     below = np.cumsum(weights[order]) - 0.5 * weights[order]
     low, high = np.interp([0.025, 0.975], below, values[order])
     return float(weights @ values), float(low), float(high)
-
-
-def log_t(d: FloatArray, variance: FloatArray, loadings: FloatArray, freedom: int) -> FloatArray:
-    """Log densities (n,) at ``d`` (n, D), but for what depends on D and ν = ``freedom`` alone (Woodbury identity).
-
-    −½ ln|S| − ½ (ν + 1) ln(1 + dᵀ S⁻¹ d/ν),  S = diag(``variance``, (n, D)) + L Lᵀ,  L = ``loadings`` (D, k).
-    """
-    inner = np.eye(loadings.shape[1]) + np.einsum("dk,nd,dl->nkl", loadings, 1.0 / variance, loadings, optimize=True)
-    seen = (d / variance) @ loadings
-    square = (d**2 / variance).sum(axis=1) - (seen * np.linalg.solve(inner, seen[..., None])[..., 0]).sum(axis=1)
-    determinant = np.log(variance).sum(axis=1) + np.linalg.slogdet(inner)[1]
-    return np.asarray(-0.5 * determinant - 0.5 * (freedom + 1) * np.log1p(square / freedom))

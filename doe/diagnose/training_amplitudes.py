@@ -104,7 +104,7 @@ def taught_shifts(lessons: Lessons, ways: Sequence[Way]) -> FloatArray:
     for way in range(len(ways)):
         there = taught.where((taught.way == way) & (taught.amplitude == 1.0))
         if len(there) > 0:
-            step = emulator.seen(there.blocks) - base - emulator.slopes @ there.theta.mean(axis=0)
+            step = emulator.seen(there.blocks) - base - emulator.moved(there.theta)[0].mean(axis=0)
             noise = len(step) * (1.0 / len(there) + 1.0 / still)
             shifts[way] = math.sqrt(REPLICATES * max(0.0, float(step @ step) - noise))
     return shifts

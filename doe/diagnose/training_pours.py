@@ -15,7 +15,17 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.declared.model import Declared, effect_of, possible
-from doe.declared.points import AS_IT_IS, Direction, Point, View, base_points, directions_of, effect_points
+from doe.declared.points import (
+    AS_IT_IS,
+    BASE,
+    Direction,
+    Point,
+    View,
+    base_points,
+    directions_of,
+    effect_points,
+    far_points,
+)
 from doe.declared.pours import ModelPours, PointPour, Search
 from doe.diagnose.budget import Budget
 from doe.diagnose.compared_features import Instrument, MeasuredFeatures
@@ -49,6 +59,9 @@ IN_QUESTION = 0.03
 FURTHER, FOLLOWED = 5.0, 3
 """Log evidence over the base model's from which on an effect is followed further whose best fit is at the end of what
 was poured, and how many of these at once: what is strong looks like nothing that was poured."""
+LIMIT, FAR = 1.5, 2.5
+"""Deviations of a parameter at the base model's best fit from which on it is poured farther off, and how far: a bent
+answer, continued straight from one deviation, looks like an effect (root 2, set 3: restitution at 2.8)."""
 BEHIND = 4.0
 """Log evidence by which a direction may be behind the best one of its effect and be in question with it."""
 
@@ -155,7 +168,12 @@ class TrainingPours:
             if way not in dict(further)
         ]
         if wanted:
-            self._pour("closer look", wanted, self._taught(-1, 0.0) + self._budget.more)
+            number = sum(point.sequence == BASE for point, (way, _) in self._acting.items() if way == -1)
+            points = base_points(self._declared, number + self._budget.more)
+            for j, theta in enumerate(found.fits["base"].theta):
+                if abs(theta) > LIMIT:
+                    points += far_points(self._declared, j, math.copysign(FAR, theta), self._budget.more)
+            self._pour("closer look", wanted, points)
         return tuple(dict.fromkeys(self.ways[way].effect for way, _, _ in wanted))
 
     def refine(self, found: Posterior, label: str) -> None:
@@ -309,12 +327,12 @@ class TrainingPours:
             return [one.seen(turns) for one in effect_points(self._declared, first, share, number)]
         return effect_points(self._declared, direction, share, number)
 
-    def _pour(self, what: str, wanted: Iterable[tuple[int, float, int]], base: int = 0) -> None:
+    def _pour(self, what: str, wanted: Iterable[tuple[int, float, int]], base: Sequence[Point] = ()) -> None:
         """Pour ways at multiples of their levels up to so many of each, of a planar effect in all its directions.
 
-        And the base model up to ``base`` times: all at once, so that no core waits for the last pour of one of them.
+        And ``base``, of the base model: all at once, so that no core waits for the last pour of one of them.
         """
-        asked = [(-1, 0.0, base_points(self._declared, base))]
+        asked: list[tuple[int, float, Sequence[Point]]] = [(-1, 0.0, base)]
         for way, multiple, number in wanted:
             angle = self.ways[way].angle
             for w in [way] if angle is None else self._all_of(way):

@@ -164,9 +164,7 @@ class _Recalibrated:
 
     def __init__(self, compared: Compared) -> None:
         data, emulator = compared.data, compared.emulator
-        loadings = (
-            np.concatenate([emulator.slopes, data.instrument], axis=1) if data.instrument.size else emulator.slopes
-        )
+        loadings = np.concatenate([emulator.slopes, data.instrument], axis=1)
         noise = np.full(len(data.z), data.scatter / data.replicates)
         self._factor = np.linalg.inv(np.linalg.cholesky(np.diag(noise) + loadings @ loadings.T))
         self.base = emulator.at(emulator.row()[None])[0][0]
@@ -180,7 +178,7 @@ def _effect_row(compared: Compared, white: _Recalibrated, label: str, pours: Seq
     found, emulator = compared.posterior, compared.emulator
     fit = found.fits[label]
     ways = [number for number, way in enumerate(emulator.ways) if way.effect == label]
-    shift = white(fit.z - emulator.slopes @ fit.theta)
+    shift = white(fit.still)
     strength = 0.0
     if ways:
         strength = float(np.linalg.norm(white(emulator.at(emulator.row({ways[0]: 1.0})[None])[0][0])))
@@ -199,9 +197,8 @@ def _effect_row(compared: Compared, white: _Recalibrated, label: str, pours: Seq
 
 
 def _similar(compared: Compared, white: _Recalibrated) -> tuple[tuple[str, str, float], ...]:
-    slopes = compared.emulator.slopes
     singles = {way.effect: compared.posterior.fits[way.effect] for way in compared.emulator.ways}
-    shifts = {name: white(fit.z - slopes @ fit.theta) for name, fit in singles.items()}
+    shifts = {name: white(fit.still) for name, fit in singles.items()}
     names = list(shifts)
     pairs = [(a, b, _cosine(shifts[a], shifts[b])) for k, a in enumerate(names) for b in names[:k]]
     return tuple(sorted(pairs, key=lambda one: -abs(one[2])))
@@ -229,12 +226,8 @@ def _residuals(compared: Compared, before: Fit, after: Fit) -> tuple[Residual, .
     measured = emulator.features(data.z)
     columns = []
     for fit in (before, after):
-        noise = (
-            np.diag(fit.variance) + data.instrument @ data.instrument.T
-            if data.instrument.size
-            else np.diag(fit.variance)
-        )
-        spread = noise + emulator.slopes @ fit.theta_covariance @ emulator.slopes.T
+        noise = np.diag(fit.variance) + data.instrument @ data.instrument.T
+        spread = noise + fit.slopes @ fit.theta_covariance @ fit.slopes.T
         sigma = np.sqrt(np.einsum("ij,jk,ik->i", inverse, spread, inverse, optimize=True))
         columns.append((emulator.features(fit.z), (squashed - inverse @ fit.z) / sigma))
     labels = [(condition, name) for condition, names in _conditions(compared) for name in names]

@@ -40,7 +40,7 @@ from scipy.linalg import block_diag
 from scipy.special import logsumexp
 from scipy.stats import norm
 
-from doe.diagnose.emulator import shrunk_covariance
+from doe.analysis.covariance import shrunk_covariance
 from doe.diagnose.result import Level
 from doe.diagnose.training_amplitudes import REPLICATES
 from doe.errors import StatisticsError

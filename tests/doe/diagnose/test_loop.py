@@ -350,7 +350,7 @@ def test_closer_looks_pour_both_sides_of_a_best_fit(measurement):
     declared = declare(measurement, NAMES)
     training = TrainingPours(declared, measurement.fit, FormulaPours(measurement.fit, [], None, None), BUDGET, str)
     way = next(k for k, one in enumerate(training.ways) if one.name == "rolling_resistance")
-    base = SimpleNamespace(log_evidence=0.0)
+    base = SimpleNamespace(log_evidence=0.0, theta=np.array([0.3, -1.6, 1.4]))
     # At 0.8 of its level: nearer to all of it than to half.
     found = SimpleNamespace(
         effects={"rolling_resistance": 0.5}, levels=[BestAmplitude(way, 0.8, 3.0)], fits={"base": base}, nothing=0.5
@@ -362,8 +362,15 @@ def test_closer_looks_pour_both_sides_of_a_best_fit(measurement):
         return int((amplitudes == 1.0).sum()), int((amplitudes == 0.5).sum())
 
     screened = poured()
+    assert set(np.abs(training.lessons().theta).ravel().round(9)) == {1.0}
     assert training.look(found) == ("rolling_resistance",)
     assert poured() == (screened[0] + BUDGET.more, screened[1])
+    # The parameter that the base model needs 1.6 deviations down is poured farther off, to that side.
+    theta = training.lessons().theta
+    far = np.abs(theta) > 1.001
+    assert far.sum() == far[:, 1].sum() == BUDGET.more
+    assert set(theta[far]) == {theta[far].min()}
+    assert training.lessons().way[far.any(axis=1)].max() == -1
     training.look(found)
     assert poured() == (screened[0] + BUDGET.more, screened[1] + BUDGET.more)
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from doe.analysis.covariance import log_t, shrunk_covariance
 from doe.diagnose.emulator import (
     ANGLES,
     CURVATURE,
@@ -19,7 +20,6 @@ from doe.diagnose.emulator import (
     emulated,
     planar_weights,
     regression,
-    shrunk_covariance,
     signature_prior,
     signature_scales,
 )
@@ -33,7 +33,6 @@ from doe.diagnose.posterior import (
     Data,
     Fit,
     gain_by_pours,
-    log_t,
     multiples,
     posterior,
 )
@@ -54,18 +53,19 @@ BASE = 24
 def emulator(shifts, freedom=200, pours=12, sensitivity=None, variance=25.0, ways=None, moved=SURE):
     """Of features of unit noise, with the base model at zero and effects shifting by ``shifts`` at amplitude 1."""
     m = len(shifts)
-    rows = [np.zeros(2 + 2 * m)] * BASE
+    rows = [np.zeros(3 + 2 * m)] * BASE
     z = [np.zeros(SIZE)] * BASE
     slope = np.zeros(SIZE) if sensitivity is None else sensitivity
     for k, sign in enumerate((-moved, moved)):
-        rows[k] = sign * np.eye(2 + 2 * m)[1]
+        rows[k] = sign * np.eye(3 + 2 * m)[1]
         z[k] = sign * slope
     for way, shift in enumerate(shifts.values()):
-        rows += [np.eye(2 + 2 * m)[2 + way]] * pours
+        rows += [np.eye(3 + 2 * m)[2 + way]] * pours
         z += [shift] * pours
     table = np.array(rows)
     table[:, 0] = 1.0
-    mean, covariance = regression(table, np.array(z), 1, np.full(SIZE, variance), np.ones((table.shape[1] - 2) // 2))
+    mean, covariance = regression(table, np.array(z), np.zeros(1), np.full(SIZE, variance), np.ones(m))
+    covariance[:, -1, -1] = 0.0  # the parameter's answer is known to be straight
     names = ways or tuple(Way(name, name) for name in shifts)
     return Emulator(names, 1, mean, covariance, freedom, (UNSQUASHED,) * 2, np.eye(SIZE), (1.0,) * m, np.zeros(m))
 
@@ -87,7 +87,7 @@ def test_the_density_is_a_gaussian_integrated_over_the_covariance():
     places = np.array([[0.0, 0.0], [1.5, 0.5], [3.0, -1.0]])
     inverse, factor = np.linalg.inv(covariances), 1.0 / np.sqrt(np.linalg.det(covariances))
     each = factor[:, None] * np.exp(-0.5 * np.einsum("ki,nij,kj->nk", places, inverse, places))
-    found = np.exp(log_t(places, np.ones((3, 2)), np.zeros((2, 0)), freedom))
+    found = np.exp(log_t(places, np.ones((3, 2)), np.zeros((3, 2, 0)), freedom))
     # Three standard errors of the mean over the draws.
     assert found / found[0] == pytest.approx(each.mean(axis=0) / each[:, 0].mean(), rel=0.02)
 
@@ -380,6 +380,37 @@ def test_parameters_that_move_in_every_pour_cost_no_pours_of_their_own():
     assert np.linalg.norm(shift) == pytest.approx(4.0, rel=0.2)
 
 
+def test_a_parameter_that_answers_bent_is_followed_where_it_was_poured_and_is_no_effect():
+    """z = θ u₅ + 0.5 (θ² − 1) u₃ and an effect along u₃: data at θ = 2 lack it, and look like it from θ = ±1."""
+    rng = np.random.default_rng(3)
+
+    def pours_at(theta):
+        features = theta * unit(5) + 0.5 * (theta**2 - 1.0) * unit(3)
+        return features + rng.standard_normal((len(theta), SIZE))
+
+    near, far = np.tile([[1.0], [-1.0]], (60, 1)), np.full((24, 1), 2.5)
+    push = np.repeat([False, True], 60)
+    measured = pours_at(np.full((600, 1), 2.0))
+    found = {}
+    for name, more in (("near", near[:0]), ("far", far)):
+        theta, way = np.concatenate([near, more]), np.concatenate([push - 1, np.full(len(more), -1)])
+        features = pours_at(theta) + np.where(way == 0, 1.0, 0.0)[:, None] * 3.0 * unit(3)
+        blocks = tuple(np.split(features, 2, axis=1))
+        lessons = Lessons(theta, way, (way == 0).astype(float), np.ones(len(way), bool), blocks)
+        taught = emulated(lessons, [Way("push", "push")])
+        found[name] = judged(taught, taught.seen(np.split(measured, 2, axis=1)))
+    assert found["near"].best[1] > 0.9
+    assert found["far"].nothing > 0.5
+    near, far = (found[name].fits["base"] for name in ("near", "far"))
+    # θ ~ N(0, 1) and six pours leave it an error of 0.3.
+    assert far.theta[0] == pytest.approx(2.0, abs=0.3)
+    assert near.theta[0] < far.theta[0] - 0.2
+    # The slope there is √(1 + (2 · 0.5 · 2)²) = 2.2 and the bend 0.5, which their prior draws towards 1 and 0.
+    assert np.linalg.norm(taught.slopes) == pytest.approx(1.0, rel=0.1)
+    assert 1.4 < np.linalg.norm(far.slopes) < 2.2
+    assert 0.25 < np.linalg.norm(taught.bends) < 0.5
+
+
 def test_pours_that_scatter_more_under_an_effect_are_known_to():
     """Three times the variance at the reference amplitude, twice at half of it: x = 2, less for the tails drawn in."""
     rng = np.random.default_rng(2)
@@ -522,7 +553,10 @@ def test_what_pours_could_gain_by_hand():
     """Δ = 3 in one feature of variance 2, 1 of which more pours take away: ½ 9/1 − ½ 9/2; 8 more by an instrument."""
 
     def fit(z):
-        return Fit("", (), np.zeros(1), np.zeros((1, 1)), np.array(z), np.full(2, 2.0), np.ones(2), 0.0, 0.5)
+        none = np.zeros((2, 1))
+        return Fit(
+            "", (), np.zeros(1), np.eye(1), none, np.array(z), np.full(2, 2.0), np.array(z), np.ones(2), 0.0, 0.5
+        )
 
     taught = SimpleNamespace(slopes=np.zeros((2, 1)))
     plain, blurred = (Data(np.zeros(2), 1.0, instrument=np.diag([size, 0.0])) for size in (0.0, math.sqrt(8.0)))

@@ -15,8 +15,7 @@ def posterior(nothing, outside, effects, badly=()):
     """Probabilities, with models that fit but for those of ``badly``."""
     none = np.zeros(0)
     fits = {
-        label: Fit(label, (), none, np.zeros((0, 0)), none, none, none, 0.0, 0.1 * FITS if label in badly else 0.5)
-        for label in ("base", *effects)
+        label: Fit(label, (), *[none] * 7, 0.0, 0.1 * FITS if label in badly else 0.5) for label in ("base", *effects)
     }
     return Posterior(nothing, outside, effects, fits, (), 0.0)
 

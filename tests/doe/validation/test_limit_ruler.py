@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from doe.diagnose.emulator import shrunk_covariance
+from doe.analysis.covariance import shrunk_covariance
 from doe.errors import StatisticsError
 from doe.validation.limit import fold_shifts, metric_of, product, ruler_of, strength_of
 from doe.validation.reference import SIDE, ReferencePours

@@ -1,0 +1,63 @@
+"""The covariance of observations in groups, shrunk, with what covariates do taken out; the density of data under one
+that few observations have told.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+Groups = npt.NDArray[np.int64]
+
+
+def shrunk_covariance(residuals: FloatArray) -> FloatArray:
+    """Covariance of the rows (n, d), correlations shrunk to zero by λ* = Σ Var(r_ij) / Σ r_ij² over i ≠ j.
+
+    Schäfer & Strimmer 2005, doi 10.2202/1544-6115.1175.
+    """
+    n = len(residuals)
+    deviation = np.sqrt((residuals**2).mean(axis=0))
+    z = residuals / deviation
+    correlation = z.T @ z / n
+    scatter = ((z**2).T @ (z**2) / n - correlation**2) / (n - 1)
+    off = ~np.eye(z.shape[1], dtype=bool)
+    denominator = float((correlation[off] ** 2).sum())
+    share = min(1.0, float(scatter[off].sum()) / denominator) if denominator > 0.0 else 1.0
+    shrunk = np.where(off, (1.0 - share) * correlation, 1.0)
+    return np.asarray(shrunk * np.outer(deviation, deviation), dtype=np.float64)
+
+
+def pooled_slopes(values: FloatArray, group: Groups, covariates: FloatArray) -> FloatArray:
+    """What ``covariates`` (n, k) do to ``values`` (n, d) within groups, (k, d), by least squares."""
+    inside, moved = _within(values, group), _within(covariates, group)
+    return np.asarray(np.linalg.lstsq(moved, inside, rcond=None)[0], dtype=np.float64)
+
+
+def residuals_within(values: FloatArray, group: Groups, covariates: FloatArray) -> FloatArray:
+    """Scatter within groups, less what ``covariates`` do, of the rows that are not alone in theirs."""
+    left = _within(values, group) - _within(covariates, group) @ pooled_slopes(values, group, covariates)
+    count = np.bincount(group)[group].astype(np.float64)
+    several = count > 1
+    # Each group's mean takes a degree of freedom.
+    return np.asarray((left * np.sqrt(count / np.maximum(1.0, count - 1.0))[:, None])[several], dtype=np.float64)
+
+
+def log_t(d: FloatArray, variance: FloatArray, loadings: FloatArray, freedom: int) -> FloatArray:
+    """Log densities (n,) at ``d`` (n, D), but for what depends on D and ν = ``freedom`` alone (Woodbury identity).
+
+    −½ ln|S| − ½ (ν + 1) ln(1 + dᵀ S⁻¹ d/ν),  S = diag(``variance``, (n, D)) + L Lᵀ,  L = ``loadings`` (n, D, k).
+    """
+    weighted = (loadings / variance[:, :, None]).swapaxes(1, 2)
+    inner = np.eye(loadings.shape[2]) + weighted @ loadings
+    seen = (weighted @ d[:, :, None])[:, :, 0]
+    square = (d**2 / variance).sum(axis=1) - (seen * np.linalg.solve(inner, seen[..., None])[..., 0]).sum(axis=1)
+    determinant = np.log(variance).sum(axis=1) + np.linalg.slogdet(inner)[1]
+    return np.asarray(-0.5 * determinant - 0.5 * (freedom + 1) * np.log1p(square / freedom))
+
+
+def _within(values: FloatArray, group: Groups) -> FloatArray:
+    count = np.bincount(group).astype(np.float64)
+    means = np.zeros((len(count), values.shape[1]))
+    np.add.at(means, group, values)
+    return np.asarray(values - (means / count[:, None])[group], dtype=np.float64)
