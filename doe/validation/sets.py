@@ -25,7 +25,7 @@ from scipy import stats
 from scipy.special import logsumexp
 
 from doe.diagnose.posterior import priors_of
-from doe.diagnose.verdict import THRESHOLD
+from doe.diagnose.verdict import DOUBTED, THRESHOLD
 from doe.errors import StatisticsError
 from doe.measurement.features import SCAN
 from doe.record import Record
@@ -327,7 +327,10 @@ def by_temperature(rows: Sequence[SetRow]) -> tuple[Tempered, ...]:
     for temperature in TEMPERATURES:
         answers = [_probabilities(row, temperature) for row in some]
         loss = [-math.log(max(LEAST_P, p[_truth(row)])) for row, p in zip(some, answers, strict=True)]
-        named = [max(p, key=lambda one: p[one]) if max(p.values()) >= THRESHOLD else "" for p in answers]
+        named = [
+            max(p, key=lambda one: p[one]) if max(p.values()) >= THRESHOLD and row.fits["base"] < DOUBTED else ""
+            for row, p in zip(some, answers, strict=True)
+        ]
         accused = [("" if one in ("base", "outside") else one, row) for one, row in zip(named, some, strict=True)]
         effects = [(one, row) for one, row in accused if row.kind == "effect"]
         null = [one for one, row in accused if row.kind == "null"]

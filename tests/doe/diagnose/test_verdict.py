@@ -8,15 +8,14 @@ from doe.diagnose.compared_features import MeasuredFeatures, weighed
 from doe.diagnose.emulator import Lessons, Way
 from doe.diagnose.posterior import FITS, Fit, Posterior
 from doe.diagnose.result import NO_EFFECT, UNEXPLAINED
-from doe.diagnose.verdict import NOTHING_AT_ONCE, NOTHING_FROM, answer, verdict_of
+from doe.diagnose.verdict import DOUBTED, NOTHING_AT_ONCE, NOTHING_FROM, answer, verdict_of
 
 
-def posterior(nothing, outside, effects, badly=()):
-    """Probabilities, with models that fit but for those of ``badly``."""
+def posterior(nothing, outside, effects, badly=(), base=DOUBTED / 2.0):
+    """Probabilities, with models that fit but for those of ``badly``; ``base``: how probable data as far off it are."""
     none = np.zeros(0)
-    fits = {
-        label: Fit(label, (), *[none] * 7, 0.0, 0.1 * FITS if label in badly else 0.5) for label in ("base", *effects)
-    }
+    likely = {"base": base} | dict.fromkeys(effects, 0.5) | dict.fromkeys(badly, 0.1 * FITS)
+    fits = {label: Fit(label, (), *[none] * 7, 0.0, likely[label]) for label in ("base", *effects)}
     return Posterior(nothing, outside, effects, fits, (), 0.0)
 
 
@@ -58,8 +57,16 @@ def test_what_is_half_sure_that_nothing_is_missing_asks_for_more(nothing, kind):
     assert answer(found, NOTHING_FROM)[0] == NO_EFFECT
 
 
+@pytest.mark.parametrize("effects", [{"a": 0.95, "b": 0.02}, {"a+b": 0.97}])
+def test_nothing_is_named_beside_a_declared_model_that_fits(effects):
+    name = next(iter(effects))
+    found = posterior(0.02, 0.01, effects, base=1.01 * DOUBTED)
+    assert answer(found)[:2] == (f"ambiguous:{name},{NO_EFFECT}", (name,))
+    assert answer(posterior(0.02, 0.01, effects, base=0.99 * DOUBTED))[1] == (name,)
+
+
 def test_the_reason_is_told():
-    assert "as far off a or b as these" in answer(posterior(0.01, 0.01, {"a": 0.6, "b": 0.38}, "ab"))[2]
+    assert "as far off a or b come up" in answer(posterior(0.01, 0.01, {"a": 0.6, "b": 0.38}, "ab"))[2]
 
 
 def test_the_tables_of_a_verdict_by_closed_form():

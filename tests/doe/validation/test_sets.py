@@ -46,7 +46,7 @@ def row(number, kind, label, verdict, strength=NAN, after=NAN, offer="scan"):
         best="a",
         best_p=0.8,
         evidence={"base": 0.0},
-        fits={"base": 0.5},
+        fits={"base": 0.05},
         before=2.0 * after,
         after=after,
         pours=12,

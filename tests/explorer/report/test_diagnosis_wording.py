@@ -80,7 +80,7 @@ def test_an_answer_that_is_taken_back_keeps_its_numbers(results):
     assert "which the held-out data took back" in text
     assert result["final"] == "adhesion_sjkr"
     assert "`adhesion_sjkr`: vary the load on a contact" in text
-    assert "p = 0.0005" in text
+    assert "p = 0.0006" in text
 
 
 def test_a_declared_model_that_held_out_data_contradict_is_called_so(results):
