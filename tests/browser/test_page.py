@@ -261,6 +261,20 @@ def test_a_pour_in_a_link_is_offered_in_words_and_poured_by_a_click_only(page, a
     page.keyboard.press("Space")
 
 
+def test_open_rooms_are_open_again_when_the_page_is_loaded_again(page, address):
+    second = page.context.browser.new_page(viewport={"width": 1280, "height": 900})
+    second.set_default_timeout(PATIENCE)
+    second.add_init_script(BEGUN)
+    second.goto(address)
+    opened = "() => [...document.querySelectorAll('#root [role=tab][aria-selected=true]')].map(one => one.textContent)"
+    for name in ("Laboratory", "Look"):
+        room(second, name)
+        second.wait_for_function(f"name => ({opened})().includes(name)", arg=name)
+    second.reload()
+    second.wait_for_function(f"() => ({opened})().join() === 'Laboratory,Look'")
+    second.close()
+
+
 def test_rooms_are_reached_in_the_window_of_a_phone(page, address):
     phone = page.context.browser.new_page(viewport={"width": 390, "height": 844}, has_touch=True)
     phone.set_default_timeout(PATIENCE)

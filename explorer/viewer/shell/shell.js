@@ -224,7 +224,7 @@ connect();
 if (!localStorage.getItem("explorer-begun")) beginning.showModal();
 
 // The rooms that are open when a page is left are opened when it is loaded again, in this window.
-const ROOMS = "explorer-rooms";
+const ROOMS = "explorer-rooms", PATIENT = 240;  // tries: a minute, for a page on a busy machine
 window.addEventListener("pagehide", () => {
   sessionStorage.setItem(ROOMS, JSON.stringify(tabs().filter(isOpen).map(one => one.textContent.trim())));
 });
@@ -233,7 +233,7 @@ for (const room of JSON.parse(sessionStorage.getItem(ROOMS) || "[]")) {
     if (isOpen(tab)) return;
     press(tab);
     tab.blur();
-  });
+  }, PATIENT);
 }
 
 // For the boards in the study panel, which are pages of this server and of the same origin.
