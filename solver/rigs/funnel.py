@@ -20,7 +20,7 @@ from typing import ClassVar
 from solver.params import ParameterError, param
 from solver.rigs.feed import RoundFeed
 from solver.rigs.outlet import RoundOutlet
-from solver.rigs.rig import DISCHARGE, PILE, Action, Container, PourRig, Switch
+from solver.rigs.rig import DISCHARGE, OUTLET_HEIGHTS, PILE, Action, Container, PourRig, Switch
 from solver.rigs.surface import Revolved, Surface, horizontal
 
 
@@ -45,9 +45,7 @@ class Funnel(PourRig):
     protocols = ("pour_through", "fill_then_open")
     refills = True
     quick_changes: ClassVar[Mapping[str, Mapping[str, float]]] = {
-        "outlet at 0.6 times the height": {"rig.outlet_height": 0.6},
-        "outlet at 1.5 times the height": {"rig.outlet_height": 1.5},
-        "outlet at twice the height": {"rig.outlet_height": 2.0},
+        **OUTLET_HEIGHTS,
         "outlet 1.3 times as wide": {"rig.outlet_diameter": 1.3},
         "outlet 1.3 times as wide at twice the height": {"rig.outlet_diameter": 1.3, "rig.outlet_height": 2.0},
     }

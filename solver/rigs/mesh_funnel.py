@@ -7,11 +7,10 @@ axis within a cut (:class:`Opening`); the gate that keeps the outlet shut is a d
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +19,7 @@ from solver.assets import AssetNotFoundError, asset_path
 from solver.params import ParameterError, param
 from solver.rigs.feed import RoundFeed
 from solver.rigs.outlet import RoundOutlet
-from solver.rigs.rig import DISCHARGE, PILE, Action, Container, PourRig, Switch
+from solver.rigs.rig import DISCHARGE, OUTLET_HEIGHTS, PILE, Action, Container, PourRig, Switch
 from solver.rigs.surface import Revolved, Surface, SurfacePose, TriangleMesh, horizontal, load_mesh
 from solver.shapes.mesh_file import LENGTH_UNITS, SUFFIXES
 
@@ -56,11 +55,7 @@ class MeshFunnel(PourRig):
     gives = (PILE, DISCHARGE)
     protocols = ("pour_through", "fill_then_open")
     refills = True
-    quick_changes: ClassVar[Mapping[str, Mapping[str, float]]] = {
-        "outlet at 0.6 times the height": {"rig.outlet_height": 0.6},
-        "outlet at 1.5 times the height": {"rig.outlet_height": 1.5},
-        "outlet at twice the height": {"rig.outlet_height": 2.0},
-    }
+    quick_changes = OUTLET_HEIGHTS
 
     @property
     def mesh_file(self) -> Path:

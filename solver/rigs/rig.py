@@ -20,6 +20,15 @@ from solver.rigs.surface import Surface
 
 NOTHING: Mapping[str, float | str] = MappingProxyType({})
 
+OUTLET_HEIGHTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
+    {
+        "outlet at 0.6 times the height": {"rig.outlet_height": 0.6},
+        "outlet at 1.5 times the height": {"rig.outlet_height": 1.5},
+        "outlet at twice the height": {"rig.outlet_height": 2.0},
+    }
+)
+"""Changes (``PourRig.quick_changes``) of a rig that is hung over its plate."""
+
 PILE = "pile"
 """Group of the observables of a free pile on the plate, whatever made it."""
 DISCHARGE = "discharge"
