@@ -47,7 +47,7 @@ class Probabilities(Record):
 
 @dataclass(frozen=True)
 class Rule(Record):
-    """Constants of the rule that the report tells (`doe.diagnose`)."""
+    """Constants of the rule that the report tells (`doe.diagnose`); ``doubted``: 1 in results from before it."""
 
     prior_nothing: float
     prior_outside: float
@@ -58,6 +58,7 @@ class Rule(Record):
     credible: float
     contradicted: float
     strong: float
+    doubted: float = 1.0
 
 
 @dataclass(frozen=True)

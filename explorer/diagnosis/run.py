@@ -20,7 +20,7 @@ from doe.diagnose.confirm import CONTRADICTED, Confirmed
 from doe.diagnose.diagnosis import Diagnosis, joined, run_diagnosis
 from doe.diagnose.posterior import FITS, NOTHING, OUTSIDE, PAIRS
 from doe.diagnose.training_amplitudes import STRONG
-from doe.diagnose.verdict import CREDIBLE, NOTHING_AT_ONCE, NOTHING_FROM
+from doe.diagnose.verdict import CREDIBLE, DOUBTED, NOTHING_AT_ONCE, NOTHING_FROM
 from doe.holdout import HoldoutError
 from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Condition, Measurement
@@ -68,6 +68,7 @@ RULE = Rule(
     credible=CREDIBLE,
     contradicted=CONTRADICTED,
     strong=STRONG,
+    doubted=DOUBTED,
 )
 
 

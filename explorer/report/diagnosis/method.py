@@ -83,6 +83,9 @@ def _methods(result: DiagnosisResult) -> str:
     conditions = enumeration(
         [f"{row.condition} ({row.features} features, {_pours(result, row.condition)})" for row in result.offered]
     )
+    doubted = (
+        f", unless the calibrated declared model fitted (p ≥ {rule['doubted']})" if result.rule.doubted < 1.0 else ""
+    )
     calibrated = [row.name for row in result.parameters if effect_of(row.name) not in result.given]
     moved = enumeration([parameter_label(name) for name in calibrated])
     held = ""
@@ -98,7 +101,7 @@ def _methods(result: DiagnosisResult) -> str:
         f"{rule['prior_nothing']} that nothing is missing, {rule['prior_outside']} for something outside the library "
         f"and {rule['prior_pairs']} for two effects at once, the rest shared alike by the single effects; evidence was "
         f"raised to the power {number(result.temperature)}. An effect was named from a posterior probability of "
-        f"{number(result.threshold)} on."
+        f"{number(result.threshold)} on{doubted}."
     )
 
 
@@ -146,6 +149,8 @@ def _pours(result: DiagnosisResult, condition: str) -> str:
 def how_reached(result: DiagnosisResult) -> Section:
     """The method in six lines, with the numbers of its rules."""
     rule = {name: number(value) for name, value in vars(result.rule).items()}
+    # A result from before this condition was judged without it.
+    doubted = f", and unlikely under the declared model (p < {rule['doubted']})" if result.rule.doubted < 1.0 else ""
     features = sum(row.features for row in result.offered)
     lines = (
         f"The same {features} features are read from measured and simulated piles. Their far tails are drawn in, and "
@@ -159,7 +164,8 @@ def how_reached(result: DiagnosisResult) -> Section:
         f"and from the priors: {rule['prior_nothing']} for nothing missing, {rule['prior_outside']} for something "
         f"outside the library, {rule['prior_pairs']} for pairs, the rest for single effects. The temperature is "
         f"{number(result.temperature)}; below 1 the answer is less sure than the evidence says.",
-        f"What reaches {percent(result.threshold)} is named if the data are likely under it (p ≥ {rule['fits']}). "
+        f"What reaches {percent(result.threshold)} is named if the data are likely under it (p ≥ {rule['fits']})"
+        f"{doubted}. "
         f"Else nothing is missing if that has {percent(result.rule.nothing_at_once)} or more "
         f"({percent(result.rule.nothing_from)} after a follow-up), unexplained if something outside is the most "
         "probable, and ambiguous otherwise: the smallest set of answers that holds "

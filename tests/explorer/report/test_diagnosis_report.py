@@ -21,7 +21,7 @@ from explorer.report.diagnosis.wording import (
     size_text,
 )
 from solver.effects import EFFECTS
-from tests.explorer.diagnosed import CASES, EXPECTED, HOSTILE, NAMES, SEEN_AS, result_of_case, typed
+from tests.explorer.diagnosed import CASES, EXPECTED, HOSTILE, NAMES, SEEN_AS, typed
 from tests.explorer.reported_diagnoses import (
     amplitude_text,
     as_number,
@@ -37,11 +37,6 @@ from tests.explorer.reported_diagnoses import (
 from tests.explorer.reported_studies import visible
 
 pytestmark = pytest.mark.usefixtures("unprinted")
-
-
-@pytest.fixture(scope="module")
-def results():
-    return {name: result_of_case(name) for name in CASES}
 
 
 @pytest.fixture(params=CASES)
@@ -226,7 +221,13 @@ def test_the_paragraph_for_a_paper_has_the_numbers_of_the_result(result):
 def test_the_method_states_its_rules(result):
     text = diagnosis_markdown(result).partition("## How the answer was reached")[2].partition("## ")[0]
     assert text.count("\n- ") == 6
-    assert "What reaches 90 % is named" in text
+    assert (
+        "What reaches 90 % is named if the data are likely under it (p ≥ 0.01), and unlikely under the declared" in text
+    )
+    assert "unless the calibrated declared model fitted (p ≥ 0.1)." in diagnosis_markdown(result)
+    before = result | {"rule": {name: one for name, one in result["rule"].items() if name != "doubted"}}
+    assert "the declared model (p <" not in diagnosis_markdown(before)
+    assert "model fitted (p" not in diagnosis_markdown(before)
     assert f"The temperature is {TEMPERATURE:g};" in text
 
 

@@ -14,7 +14,7 @@ from explorer.report.diagnosis.wording import (
     feature_label,
 )
 from solver import ASYMMETRY_NAMES, BULK_NAMES, HISTOGRAM_NAMES, PROFILE_NAMES, TEXTURE_NAMES
-from tests.explorer.diagnosed import CASES, diagnosed, result_of_case, typed
+from tests.explorer.diagnosed import CASES, diagnosed, typed
 from tests.explorer.reported_diagnoses import (
     amplitude_text,
     cautions,
@@ -26,11 +26,6 @@ from tests.explorer.reported_diagnoses import (
 from tests.explorer.reported_studies import visible
 
 pytestmark = pytest.mark.usefixtures("unprinted")
-
-
-@pytest.fixture(scope="module")
-def results():
-    return {name: result_of_case(name) for name in CASES}
 
 
 def probability(result, name):
