@@ -3,7 +3,7 @@
 import pytest
 
 from tests.browser.served import served
-from tests.browser.test_page import BEGUN, PATIENCE, SETTINGS, no_serious_fault, room
+from tests.browser.test_page import BEGUN, PATIENCE, SETTINGS, no_serious_fault, room, unfold
 from tests.browser.test_photographed_target import seen, shot
 
 pytestmark = pytest.mark.browser
@@ -18,7 +18,7 @@ def page(browser, tmp_path_factory):
         page.add_init_script(BEGUN)
         page.goto(address)
         room(page, "Laboratory")
-        page.get_by_text("Your own design → runs", exact=True).click()
+        unfold(page, "Your own design → runs")
         yield page
         page.close()
 
@@ -66,8 +66,7 @@ def test_a_sheet_is_taken_along_filled_and_analysed(page, tmp_path):
     assert len(runs) == 17
     filled = tmp_path / "filled.csv"
     filled.write_text("\n".join([*lines[: head + 1], *(f"{line}{24 + k % 5},5" for k, line in enumerate(runs))]))
-    page.get_by_text("Your own design → runs", exact=True).click()
-    page.get_by_text("Filled sheet → model and optimum", exact=True).click()
+    unfold(page, "Filled sheet → model and optimum")
     with page.expect_file_chooser() as chooser:
         press(page, "Upload: sheet")
     chooser.value.set_files(filled)
@@ -100,7 +99,7 @@ def test_the_sheet_is_filled_in_on_the_page_and_a_run_is_left_out(page):
 
 def test_all_ranges_are_changed_in_one_table(page):
     room(page, "Calibrate")
-    page.get_by_text("Ranges and target of the next study", exact=True).click()
+    unfold(page, "Ranges and target of the next study")
     with page.expect_popup() as opened:
         page.get_by_role("link", name="All ranges in a table").click()
     table = opened.value

@@ -5,7 +5,7 @@ import pytest
 from explorer.scene.text import material_toml
 from solver import load_material, with_values
 from tests.browser.served import served
-from tests.browser.test_page import PATIENCE, SETTINGS, room
+from tests.browser.test_page import PATIENCE, SETTINGS, room, unfold
 from tests.browser.test_photographed_target import seen, shot
 
 pytestmark = pytest.mark.browser
@@ -49,7 +49,7 @@ def test_a_material_file_of_the_browser_is_poured(page, tmp_path):
     (tmp_path / "from home.toml").write_text(material_toml(own))
     page.keyboard.press("Escape")  # the start dialogue, where it is still open
     room(page, "Set-up")
-    page.get_by_text("Rig and material", exact=True).click()
+    unfold(page, "Rig and material")
     with page.expect_file_chooser() as chooser:
         page.get_by_role("button", name="Upload a material and pour", exact=True).click()
     chooser.value.set_files(tmp_path / "from home.toml")

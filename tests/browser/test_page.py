@@ -88,6 +88,15 @@ def room(page, name):
     page.evaluate(f"window.explorer.openRoom('{name}')")
 
 
+def unfold(page, title):
+    """Unfold a section of a room.
+
+    By key: a click of the mouse is lost where what stands above the head moves between press and release.
+    """
+    page.get_by_role("button", name=title, exact=True, expanded=False).filter(visible=True).first.press("Enter")
+    page.get_by_role("button", name=title, exact=True, expanded=True).filter(visible=True).first.wait_for()
+
+
 def positions(page):
     """Positions of all bodies as the page has them [m], shape (n, 3)."""
     return np.array(page.evaluate(POSITIONS)).reshape(-1, 3)

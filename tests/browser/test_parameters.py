@@ -11,7 +11,17 @@ import trimesh
 from explorer.recordings.recording_reader import read_recording
 from tests.browser import test_page as shared
 from tests.browser.served import served
-from tests.browser.test_page import SETTINGS, positions, room, simulated_time, slider, state, to_its_end, wait_for
+from tests.browser.test_page import (
+    SETTINGS,
+    positions,
+    room,
+    simulated_time,
+    slider,
+    state,
+    to_its_end,
+    unfold,
+    wait_for,
+)
 
 pytestmark = pytest.mark.browser
 
@@ -71,8 +81,8 @@ def test_a_mesh_with_a_hole_is_refused_in_words_and_the_pour_goes_on(page, tmp_p
     box.export(tmp_path / "open.stl")
     press(page, "r")
     wait_for(lambda: state(page) == "running")
-    page.get_by_text("Rig and material").click()
-    page.get_by_text("Shape or funnel from a mesh", exact=True).click()
+    unfold(page, "Rig and material")
+    unfold(page, "Shape or funnel from a mesh")
     with page.expect_file_chooser() as chooser:
         page.get_by_role("button", name="Upload a body and pour").click()
     chooser.value.set_files(tmp_path / "open.stl")

@@ -8,7 +8,7 @@ import pytest
 
 from explorer.project.project import new_project
 from tests.browser.served import served
-from tests.browser.test_page import BEGUN, PATIENCE, SETTINGS, no_serious_fault, room
+from tests.browser.test_page import BEGUN, PATIENCE, SETTINGS, no_serious_fault, room, unfold
 
 pytestmark = pytest.mark.browser
 
@@ -69,7 +69,7 @@ def shot(page, name):
 def test_a_photograph_is_read_and_made_the_target(browser, project):
     with opened(browser, project) as page:
         room(page, "Laboratory")
-        page.get_by_text("Photograph → angle of repose").click()
+        unfold(page, "Photograph → angle of repose")
         # The example comes with the length of its bar.
         bar = page.get_by_label("Reference bar [mm]")
         bar.wait_for()
@@ -103,7 +103,7 @@ def test_it_is_there_after_a_restart_until_it_is_removed(browser, project):
     with opened(browser, project) as page:
         page.locator("#state-line").get_by_text("· photograph").wait_for()
         room(page, "Laboratory")
-        page.get_by_text("Photograph → angle of repose").click()
+        unfold(page, "Photograph → angle of repose")
         remove = page.get_by_role("button", name="Remove the target", exact=True)
         page.wait_for_function(ENABLED, arg="Remove the target")
         # By key: what is loaded above it may push it away from under the pointer.
@@ -118,7 +118,7 @@ def test_it_is_there_after_a_restart_until_it_is_removed(browser, project):
 def test_the_base_line_and_a_length_are_clicked_in_the_photograph(browser, project):
     with opened(browser, project) as page:
         room(page, "Laboratory")
-        page.get_by_text("Photograph → angle of repose").click()
+        unfold(page, "Photograph → angle of repose")
         with page.expect_popup() as popped:
             page.get_by_role("link", name="Mark base line or a known length in it").click()
         table = popped.value

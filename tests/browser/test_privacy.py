@@ -5,7 +5,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from tests.browser.test_page import BEGUN, PATIENCE
+from tests.browser.test_page import BEGUN, PATIENCE, unfold
 from tests.browser.test_study_page import address, data, opened  # noqa: F401
 from tests.explorer.report.test_charts_stay_private import PAGES
 
@@ -70,7 +70,7 @@ def test_the_live_page_offers_no_upload_and_asks_no_other_host(page, address):  
     frame = page.frame_locator('iframe[title="Study"]')
     frame.locator(".js-plotly-plot .modebar").first.wait_for(state="attached")
     assert_no_upload(next(one for one in page.frames if "board.html" in one.url))
-    page.get_by_text("Profiler", exact=True).filter(visible=True).first.click()
+    unfold(page, "Profiler")
     page.locator(".js-plotly-plot .modebar").first.wait_for(state="attached")
     assert_no_upload(page)
     page.locator(".js-plotly-plot").hover()

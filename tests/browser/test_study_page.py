@@ -9,7 +9,7 @@ import pytest
 
 from tests.browser.served import served
 from tests.browser.test_design_page import write_into
-from tests.browser.test_page import BEGUN, FLAGS, PATIENCE, SETTINGS, positions, room, slider, wait_for
+from tests.browser.test_page import BEGUN, FLAGS, PATIENCE, SETTINGS, positions, room, slider, unfold, wait_for
 from tests.browser.test_photographed_target import shot
 from tests.explorer import reported_studies
 
@@ -119,7 +119,7 @@ def test_a_section_opens_by_keyboard(page):
 
 
 def test_a_slider_of_the_profiler_moves_its_chart_by_keyboard(page):
-    page.get_by_text("Profiler", exact=True).filter(visible=True).first.click()
+    unfold(page, "Profiler")
     page.locator(".js-plotly-plot").first.wait_for()
     thumb = slider(page, "X7:")
     thumb.scroll_into_view_if_needed()
