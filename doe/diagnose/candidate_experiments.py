@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from doe.analysis.covariance import shrunk_means
 from doe.declared.points import AS_IT_IS
 from doe.declared.pours import ModelPours
 from doe.diagnose.compared_features import usable
@@ -116,7 +117,7 @@ def next_experiment(
     for c, set_up in enumerate(set_ups):
         lessons = training.told(probes, [[row[c]] for row in rows])
         with suppress(StatisticsError):  # a set-up that jams tells nothing
-            items.append(_item(training, found, tuple(weights), lessons, model, c, set_up))
+            items.append(_item(training, found, weights, lessons, model, c, set_up))
     if not items:
         return CandidateExperiments((), model.run_now)
     asked = dict.fromkeys(name for label in weights if label != "base" for name in label.split("+"))
@@ -131,7 +132,7 @@ def next_experiment(
 def _item(
     training: TrainingPours,
     found: Posterior,
-    labels: Sequence[str],
+    weights: Mapping[str, float],
     lessons: Lessons,
     pours: ModelPours,
     c: int,
@@ -150,20 +151,21 @@ def _item(
     axis_error = max((one.axis_error for one in set_up.surfaces.values()), default=0.0)
     if axis_error > 0.0:
         axis = training.axis_in(pours, c, len(feature_set(set_up).scalars), axis_error)[:, columns]
-        slope = emulator.squashes[0].slope(emulator.squashes[0].centre)
-        shared = emulator.whitening @ (axis * slope).T
-    expected = {label: emulator.at(_rows(emulator, training, found, label)) for label in labels}
-    moved = {label: emulator.moved(found.fits[label].theta[None]) for label in labels}
-    # How well a regression of few pours knows an answer is no property of it that would give it away, nor does it stay.
-    noise = np.mean([expected[label][1][0] + moved[label][1][0] for label in labels], axis=0) * POURS / TAUGHT
+        shared = emulator.whitening @ (axis * emulator.squashes[0].slope(emulator.squashes[0].centre)).T
+    rows = [_rows(emulator, training, found, label) for label in weights]
+    best, theta = np.array([some[0] for some in rows]), np.array([found.fits[label].theta for label in weights])
+    _, loose, slopes = emulator.moved(theta)
+    # How well a regression of few pours knows an answer is no property of it that would give it away, nor does it stay;
+    # and what its noise sets between two answers tells nothing apart.
+    unsure = np.diag((emulator.at(best)[1] + loose).mean(axis=0)) * POURS / TAUGHT
+    placed = emulator.placed(best, theta)
+    means = shrunk_means(emulator.at(placed)[0], emulator.scatter(placed), np.array(list(weights.values())))
     predictions = {}
-    for label, ((mean, *beside), _) in expected.items():
-        (shift,), _, (slopes,) = moved[label]
-        loose = np.array([one - mean for one in beside]).reshape(-1, len(mean))
-        covariance = np.diag(noise) + slopes @ found.fits[label].theta_covariance @ slopes.T
-        covariance += loose.T @ loose + shared @ shared.T
-        predictions[label] = Prediction(mean + shift, covariance)
-    return CandidateExperiment(set_up.name, predictions, np.eye(len(columns)))
+    for label, mean, some, slope in zip(weights, means, rows, slopes, strict=True):
+        beside = emulator.at(some[1:])[0] - emulator.at(some[:1])[0]
+        covariance = unsure + slope @ found.fits[label].theta_covariance @ slope.T + beside.T @ beside
+        predictions[label] = Prediction(mean, covariance + shared @ shared.T)
+    return CandidateExperiment(set_up.name, predictions)
 
 
 def _rows(emulator: Emulator, training: TrainingPours, found: Posterior, label: str) -> FloatArray:

@@ -147,10 +147,6 @@ class Squash:
         """Features of pours, (n, d_c), with their far tails drawn in."""
         return np.asarray(SQUASH * np.arcsinh((pours - self.centre) / (SQUASH * self.deviation)), dtype=np.float64)
 
-    def back(self, drawn_in: FloatArray) -> FloatArray:
-        """The inverse."""
-        return np.asarray(self.centre + SQUASH * self.deviation * np.sinh(drawn_in / SQUASH), dtype=np.float64)
-
     def slope(self, pours: FloatArray) -> FloatArray:
         """Derivative at ``pours``."""
         x = (pours - self.centre) / (SQUASH * self.deviation)
@@ -168,7 +164,9 @@ class Emulator:
     parameters
         k.
     mean, covariance
-        Of the coefficients (b, J, β_1 … β_m, γ_1 … γ_m, Q) of every feature: (D, 1 + 2k + 2m) and, squared, (D, …, …).
+        Of the c coefficients (b, J, β_1 … β_m, γ_1 … γ_m, Q) of every feature: (D, c = 1 + 2k + 2m) and (D, c, c).
+    information
+        Xᵀ X of the pours that taught it, (c, c).
     freedom
         Degrees of freedom of Σ.
     squashes, whitening
@@ -183,6 +181,7 @@ class Emulator:
     parameters: int
     mean: FloatArray
     covariance: FloatArray
+    information: FloatArray
     freedom: int
     squashes: tuple[Squash, ...]
     whitening: FloatArray
@@ -191,15 +190,15 @@ class Emulator:
 
     def seen(self, pours: Sequence[FloatArray]) -> FloatArray:
         """Mean of ``pours``, z (D,)."""
-        return _whitened(self.whitening, [squash(block) for squash, block in zip(self.squashes, pours, strict=True)])
+        means = [squash(block).mean(axis=0) for squash, block in zip(self.squashes, pours, strict=True)]
+        return np.asarray(self.whitening @ np.concatenate(means), dtype=np.float64)
 
     def features(self, z: FloatArray) -> FloatArray:
         """Features (..., D) of all conditions, natural units, that ``z`` (..., D) stands for."""
         drawn_in = np.linalg.solve(self.whitening, np.atleast_2d(z).T).T
-        ends = np.cumsum([len(squash.centre) for squash in self.squashes])[:-1]
-        parts = np.split(drawn_in, ends, axis=1)
-        found = np.concatenate([squash.back(part) for squash, part in zip(self.squashes, parts, strict=True)], axis=1)
-        return found.reshape(z.shape)
+        centre = np.concatenate([squash.centre for squash in self.squashes])
+        deviation = np.concatenate([squash.deviation for squash in self.squashes])
+        return np.asarray(centre + SQUASH * deviation * np.sinh(drawn_in / SQUASH)).reshape(z.shape)
 
     @property
     def slopes(self) -> FloatArray:
@@ -234,12 +233,22 @@ class Emulator:
                 row[first + m + way] += weight * (a**2 - a)
         return row
 
+    def placed(self, rows: FloatArray, theta: FloatArray) -> FloatArray:
+        """``rows`` with the parameters at ``theta`` (n, k)."""
+        first, last = 1 + self.parameters, 1 + self.parameters + 2 * len(self.ways)
+        return np.concatenate([rows[:, :1], theta, rows[:, first:last], theta**2 - 1.0], axis=1)
+
     def at(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Means and variances of z, (n, D) each, for ``rows`` of the regression."""
         used = np.flatnonzero(np.any(rows != 0.0, axis=0))
         some, covariance = rows[:, used], self.covariance[:, used][:, :, used]
         variance = np.einsum("ni,dij,nj->nd", some, covariance, some, optimize=True)
         return some @ self.mean[:, used].T, np.asarray(variance, dtype=np.float64)
+
+    def scatter(self, rows: FloatArray) -> FloatArray:
+        """Sum over z of the covariance (n, n) of the means for ``rows`` between sets of as many teaching pours."""
+        gained = rows @ self.covariance
+        return np.einsum("dni,ij,dmj->nm", gained, self.information, gained, optimize=True)
 
     def noise(self, rows: FloatArray) -> FloatArray:
         """Variance of a pour, (n,), for ``rows`` of the regression; 1 of the base model."""
@@ -315,9 +324,11 @@ def emulated(
     rows[acting, 1 + k + m + lessons.way[acting]] = a**2 - a
     excess = _excess(z, lessons, m)
     spread = np.sqrt(noise_of(rows[:, 1 + k : 1 + k + m], excess))[:, None]
-    mean, covariance = regression(rows / spread, z @ axes / spread, (slopes**2).mean(axis=1), variances, scales)
+    rows = rows / spread
+    mean, covariance = regression(rows, z @ axes / spread, (slopes**2).mean(axis=1), variances, scales)
     reached = tuple(float(lessons.amplitude[lessons.way == w].max()) for w in range(m))
-    return Emulator(tuple(ways), k, mean, covariance, freedom, squashes, axes.T @ whitening, reached, excess)
+    turned = axes.T @ whitening
+    return Emulator(tuple(ways), k, mean, covariance, rows.T @ rows, freedom, squashes, turned, reached, excess)
 
 
 def noise_of(amplitudes: FloatArray, excess: FloatArray) -> FloatArray:
@@ -410,7 +421,3 @@ def _whitening(drawn_in: Sequence[FloatArray], own: Lessons, weights: Sequence[f
     several = np.bincount(group) > 1
     pours = int(several[group].sum())
     return white, max(1, pours - int(several.sum()) - own.theta.shape[1])
-
-
-def _whitened(whitening: FloatArray, blocks: Sequence[FloatArray]) -> FloatArray:
-    return np.asarray(whitening @ np.concatenate([block.mean(axis=0) for block in blocks]), dtype=np.float64)

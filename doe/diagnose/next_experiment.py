@@ -1,13 +1,13 @@
 """Which experiment of the candidates tells the answers that are left apart, and with which chance.
 
-The chance of a set-up is how often the right answer ends with a probability of ``SURE`` once n pours of it are there: a
-truth is drawn by the probabilities that the answers have now, the mean of its n pours by what it predicts, and the
-answers are weighed by Bayes's theorem,
+The chance of a set-up is how often the right answer is given, by the rules of ``verdict.py`` after a follow-up, once n
+pours of it are there: a truth is drawn by the probabilities that the answers have now, the mean of its n pours by what
+it predicts, and the answers are weighed by Bayes's theorem,
 
-    data of i ~ N(m_i, V/n + W_i),    p_j ∝ w_j N(data; m_j, V/n + W_j)ᵀ
+    data of i ~ N(m_i, 1/n + W_i),    p_j ∝ w_j N(data; m_j, 1/n + W_j)ᵀ
 
-with V the covariance of one pour, W_i that of what i predicts and T the temperature at which all data are weighed
-(``posterior.py``). This is the expected posterior of Box and Hill 1967
+in features whitened by the covariance of one pour, with W_i the covariance of what i predicts and T the temperature at
+which all data are weighed (``posterior.py``). This is the expected posterior of Box and Hill 1967
 (doi 10.1080/00401706.1967.10490441) counted as a laboratory would: an answer, or none.
 """
 
@@ -23,15 +23,14 @@ import numpy.typing as npt
 
 from doe.diagnose.posterior import TEMPERATURE
 from doe.diagnose.result import RankedExperiment
-from doe.errors import StatisticsError
+from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD
 
 FloatArray = npt.NDArray[np.float64]
 
-SURE, DRAWS = 0.9, 400
-"""Probability that is an answer, and made-up data sets of each answer."""
+DRAWS = 400
+"""Made-up data sets of each answer."""
 PLANNED, GIVEN_UP = (6, 12, 24), 0.05
-"""Pours that may be asked of a laboratory, and the chance that is given up for fewer. By the fewest with a chance of
-80 %, as until 2026-11-28, 15 of 23 follow-ups of single effects (root 1) ended right."""
+"""Pours that may be asked of a laboratory, and the chance that is given up for fewer."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +43,10 @@ class Prediction:
 
 @dataclass(frozen=True)
 class CandidateExperiment:
-    """A feasible set-up: prediction by every answer that is left, and the covariance of one pour, (d, d)."""
+    """A feasible set-up, and what every answer that is left predicts there."""
 
     name: str
     predictions: Mapping[str, Prediction]
-    pour: FloatArray
 
 
 def rank_experiments(
@@ -56,16 +54,8 @@ def rank_experiments(
 ) -> tuple[RankedExperiment, ...]:
     """Return the candidates, the best chance of an answer first, the larger separation first among equals.
 
-    weights: of the answers that are left; replicates: pours that are asked for.
-
-    Raises StatisticsError with fewer than two answers, no candidate, or a set-up that some answer does not predict.
+    weights: probabilities of the answers that are left; replicates: pours that are asked for.
     """
-    if len(weights) < 2 or not candidates:
-        raise StatisticsError(f"{len(weights)} answers and {len(candidates)} set-ups; allowed are at least 2 and 1")
-    for item in candidates:
-        missing = sorted(set(weights) - set(item.predictions))
-        if missing:
-            raise StatisticsError(f"{item.name}: no prediction by {', '.join(missing)}")
     rows = [
         RankedExperiment(
             item.name, chance_of_an_answer(item, weights, replicates), _least_separation(item, tuple(weights))
@@ -87,22 +77,27 @@ def fewest_pours(
 def chance_of_an_answer(
     item: CandidateExperiment, weights: Mapping[str, float], replicates: int, seed: int = 0
 ) -> float:
-    """Return how often the true answer ends with a probability of `SURE`, by `DRAWS` made-up data sets of each."""
+    """Return how often the true answer is given, by `DRAWS` made-up data sets of each.
+
+    Answers beyond `weights`, which nothing was poured for, fare as the wrong ones of these do; none of them is found.
+    """
     names, rng = tuple(weights), np.random.default_rng(seed)
-    share = np.array([weights[name] for name in names]) / sum(weights.values())
-    factors = [np.linalg.cholesky(item.pour / replicates + item.predictions[name].covariance) for name in names]
-    right = 0.0
+    prior = np.array(list(weights.values()))
+    pour = np.eye(len(item.predictions[names[0]].mean))
+    factors = [np.linalg.cholesky(pour / replicates + item.predictions[name].covariance) for name in names]
+    chance = 0.0
     for k, name in enumerate(names):
-        drawn = item.predictions[name].mean + rng.standard_normal((DRAWS, len(item.pour))) @ factors[k].T
+        drawn = item.predictions[name].mean + rng.standard_normal((DRAWS, len(pour))) @ factors[k].T
         logs = []
         for j, other in enumerate(names):
             white = np.linalg.solve(factors[j], (drawn - item.predictions[other].mean).T)
             log_likelihood = -np.log(np.diag(factors[j])).sum() - 0.5 * (white**2).sum(axis=0)
-            logs.append(np.log(share[j]) + TEMPERATURE * log_likelihood)
-        stacked = np.stack(logs)
-        posterior = np.exp(stacked - stacked.max(axis=0))
-        right += float(share[k]) * float((posterior[k] / posterior.sum(axis=0) >= SURE).mean())
-    return right
+            logs.append(np.log(prior[j]) + TEMPERATURE * log_likelihood)
+        odds = np.exp(np.stack(logs) - logs[k])
+        wrong = (odds.sum(axis=0) - 1.0) * (1.0 - prior[k]) / (prior.sum() - prior[k])
+        enough = NOTHING_FROM if name == "base" else THRESHOLD
+        chance += float(prior[k]) * float((1.0 / (1.0 + wrong) >= enough).mean())
+    return chance
 
 
 def _least_separation(item: CandidateExperiment, names: Sequence[str]) -> float:
@@ -110,5 +105,5 @@ def _least_separation(item: CandidateExperiment, names: Sequence[str]) -> float:
     for i, j in combinations(names, 2):
         one, other = item.predictions[i], item.predictions[j]
         gap = one.mean - other.mean
-        distances.append(float(gap @ np.linalg.solve(item.pour + one.covariance + other.covariance, gap)))
+        distances.append(float(gap @ np.linalg.solve(np.eye(len(gap)) + one.covariance + other.covariance, gap)))
     return math.sqrt(min(distances))

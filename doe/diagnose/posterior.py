@@ -419,7 +419,8 @@ class _Weigher:
         full = np.diag(noise) + slopes @ slopes.T + self._data.instrument @ self._data.instrument.T
         square = float(d @ np.linalg.solve(full, d)) / len(d)
         weights = np.exp(logs - logsumexp(logs))
-        owners = _owners(effects, self._emulator)
+        sizes = {way.effect: len(way.unit) for way in self._emulator.ways}
+        owners = [(effect, index) for effect in effects for index in range(sizes[effect])]
         amplitudes = tuple(
             Amplitude(effect, index, *_spread_of(natural[:, column], weights), bool(ends[best]))
             for column, (effect, index) in enumerate(owners)
@@ -437,11 +438,6 @@ class _Weigher:
             float(logsumexp(logs)) - math.log(len(logs)),
             float(stats.f.sf(square, len(d), self._emulator.freedom)),
         )
-
-
-def _owners(effects: Sequence[str], emulator: Emulator) -> list[tuple[str, int]]:
-    sizes = {way.effect: len(way.unit) for way in emulator.ways}
-    return [(effect, index) for effect in effects for index in range(sizes[effect])]
 
 
 def _spread_of(values: FloatArray, weights: FloatArray) -> tuple[float, float, float]:

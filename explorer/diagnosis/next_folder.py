@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape
 
-from doe.diagnose.next_experiment import SURE
 from doe.diagnose.result import BASE, Suggestion
+from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD
 from doe.errors import MeasurementError
 from doe.measurement.condition_table import AS_THEY_ARE, FEED_SLACK
 from doe.measurement.load import FILE, MeasurementFile, load_measurement
@@ -366,8 +366,9 @@ Pour **{pours} times**, each time onto the bare plate.{reading}
 
 ## What it will decide
 
-If one of these answers is right, {pours} pours single it out (probability of {percent(SURE)} or more) with a chance of
-**{percent(experiment.chance)}**, by simulated pours of each answer.
+{pours} pours give the right answer with a chance of **{percent(experiment.chance)}**, by simulated pours of the
+likeliest of these. (An effect is named with {percent(THRESHOLD)} or more, nothing missing is the answer with
+{percent(NOTHING_FROM)} or more.)
 
 ## Why this one
 

@@ -272,11 +272,10 @@ def suggestions(verdict):
         CandidateExperiment(
             name,
             {rival: Prediction(np.array([gap * k, 0.0, 0.0]), 0.05 * pour) for rival, k in rivals.items()},
-            pour,
         )
         for name, gap in (("as it is, poured again", 0.0), ("half the mass", 2.0))
     ]
-    ranked = rank_experiments(menu, dict.fromkeys(rivals, 1.0), 6)
+    ranked = rank_experiments(menu, dict.fromkeys(rivals, 1.0 / len(rivals)), 6)
     levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in verdict.names if name in EFFECTS)
     changes = {"rig.outlet_height": 0.12}
     return tuple(Suggestion(one, changes, "fit", tuple(rivals), levers, 6) for one in ranked)

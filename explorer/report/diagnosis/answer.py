@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from doe.diagnose.next_experiment import SURE
 from doe.diagnose.result import NO_EFFECT, UNEXPLAINED, EffectRow, HeldOut, Place
+from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD
 from doe.holdout import OVERALL
 from explorer.diagnosis.result import CORRECTED, CORRECTED_STUDY, DiagnosisResult, ErrorRow, Kind, answers
 from explorer.report.content import Banner, Block, Bullets, Caution, Facts, Figure, Section, Table, Text, Word
@@ -484,7 +484,8 @@ def _ranked(result: DiagnosisResult) -> list[Block]:
         Table(
             ("set-up", "chance of an answer", "least separation of one pour"),
             rows,
-            f"Chance: how often the right answer ends with a probability of {percent(SURE)}, by made-up data. "
+            f"Chance: how often made-up data give the right answer ({percent(THRESHOLD)} for a name, "
+            f"{percent(NOTHING_FROM)} for nothing missing). "
             "Separation: distance of the two answers that are closest, in σ of one pour and of the prediction.",
         ),
     ]

@@ -8,7 +8,6 @@ from scipy import stats
 
 from doe.diagnose.next_experiment import (
     DRAWS,
-    SURE,
     CandidateExperiment,
     Prediction,
     chance_of_an_answer,
@@ -16,14 +15,15 @@ from doe.diagnose.next_experiment import (
     rank_experiments,
 )
 from doe.diagnose.posterior import TEMPERATURE
-from doe.errors import StatisticsError
+from doe.diagnose.verdict import NOTHING_FROM
+from doe.diagnose.verdict import THRESHOLD as SURE
 
 WEIGHTS = {"a": 0.5, "b": 0.5}
 
 
 def item(gap, own=0.0, name="x", d=1):
     zero, wide = np.zeros(d), own * np.eye(d)
-    return CandidateExperiment(name, {"a": Prediction(zero, wide), "b": Prediction(zero + gap, wide)}, np.eye(d))
+    return CandidateExperiment(name, {"a": Prediction(zero, wide), "b": Prediction(zero + gap, wide)})
 
 
 @pytest.mark.parametrize(("gap", "pours", "own"), [(0.5, 6, 0.0), (1.0, 6, 0.0), (1.0, 12, 0.0), (1.0, 6, 0.1)])
@@ -39,7 +39,7 @@ def test_the_chance_is_that_of_the_likelihood_ratio(gap, pours, own):
 def test_answers_of_one_mean_are_told_apart_by_how_sure_they_are():
     """Both at 0, deviations s and 30 s: the log odds of the narrow one are T (ln 30 − x² (1 − 1/900)/(2 s²))."""
     zero, narrow, wide = np.zeros(1), 1e-6 * np.eye(1), (900.0 / 6.0 - 1.0 / 6.0) * np.eye(1)
-    one = CandidateExperiment("x", {"a": Prediction(zero, narrow), "b": Prediction(zero, wide)}, np.eye(1))
+    one = CandidateExperiment("x", {"a": Prediction(zero, narrow), "b": Prediction(zero, wide)})
     sure, scale = math.log(SURE / (1.0 - SURE)) / TEMPERATURE, 0.5 * (1.0 - 1.0 / 900.0)
     below = stats.chi2.cdf((math.log(30.0) - sure) / scale, 1)
     above = stats.chi2.sf((math.log(30.0) + sure) / scale / 900.0, 1)
@@ -52,6 +52,24 @@ def test_answers_of_one_mean_are_told_apart_by_how_sure_they_are():
 def test_a_likely_answer_needs_less():
     near = chance_of_an_answer(item(1.0), {"a": 0.85, "b": 0.15}, 6)
     assert near > chance_of_an_answer(item(1.0), WEIGHTS, 6)
+
+
+def test_nothing_missing_is_an_answer_with_less():
+    s = math.sqrt(6.0)
+    named, nothing = (
+        stats.norm.cdf(0.5 * s - math.log(sure / (1.0 - sure)) / (TEMPERATURE * s)) for sure in (SURE, NOTHING_FROM)
+    )
+    one = CandidateExperiment("x", {"base" if k == "b" else k: p for k, p in item(1.0).predictions.items()})
+    found = chance_of_an_answer(one, {"a": 0.5, "base": 0.5}, 6)
+    assert found == pytest.approx(0.5 * (named + nothing), abs=3.0 * math.sqrt(0.25 / (2 * DRAWS)))
+
+
+def test_answers_that_nothing_was_poured_for_fare_as_the_wrong_ones_do():
+    """Beside one half as probable as each of two, the wrong one counts twice: the odds have to reach 18, not 9."""
+    s = math.sqrt(6.0)
+    expected = 0.8 * stats.norm.cdf(0.5 * s - math.log(1.5 * SURE / (1.0 - SURE)) / (TEMPERATURE * s))
+    found = chance_of_an_answer(item(1.0), {"a": 0.4, "b": 0.4}, 6)
+    assert found == pytest.approx(expected, abs=3.0 * math.sqrt(0.25 / (2 * DRAWS)))
 
 
 def test_the_candidates_are_ranked_and_set_ups_that_say_nothing_come_last():
@@ -78,10 +96,3 @@ def test_the_candidates_are_ranked_and_set_ups_that_say_nothing_come_last():
 )
 def test_the_fewest_pours_that_do_nearly_as_well_are_asked_for(gap, own, pours):
     assert fewest_pours([item(gap, own), item(0.0, name="same")], WEIGHTS)[0] == pours
-
-
-def test_bad_candidates_are_refused():
-    with pytest.raises(StatisticsError, match="at least 2"):
-        rank_experiments([item(1.0)], {"a": 1.0}, 6)
-    with pytest.raises(StatisticsError, match="no prediction by c"):
-        rank_experiments([item(1.0)], {"a": 1.0, "c": 1.0}, 6)

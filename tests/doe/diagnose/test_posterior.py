@@ -67,7 +67,18 @@ def emulator(shifts, freedom=200, pours=12, sensitivity=None, variance=25.0, way
     mean, covariance = regression(table, np.array(z), np.zeros(1), np.full(SIZE, variance), np.ones(m))
     covariance[:, -1, -1] = 0.0  # the parameter's answer is known to be straight
     names = ways or tuple(Way(name, name) for name in shifts)
-    return Emulator(names, 1, mean, covariance, freedom, (UNSQUASHED,) * 2, np.eye(SIZE), (1.0,) * m, np.zeros(m))
+    return Emulator(
+        names,
+        1,
+        mean,
+        covariance,
+        table.T @ table,
+        freedom,
+        (UNSQUASHED,) * 2,
+        np.eye(SIZE),
+        (1.0,) * m,
+        np.zeros(m),
+    )
 
 
 def judged(taught, z, replicates=6, pairs=False):
@@ -90,6 +101,30 @@ def test_the_density_is_a_gaussian_integrated_over_the_covariance():
     found = np.exp(log_t(places, np.ones((3, 2)), np.zeros((3, 2, 0)), freedom))
     # Three standard errors of the mean over the draws.
     assert found / found[0] == pytest.approx(each.mean(axis=0) / each[:, 0].mean(), rel=0.02)
+
+
+def test_what_predictions_vary_by_is_what_the_noise_of_each_pour_does_to_them():
+    """The mean is linear in z: a unit of noise in one feature of one pour moves two predictions by d and e, sum d e."""
+    rng = np.random.default_rng(5)
+    rows = np.column_stack([np.ones(9), rng.standard_normal((9, 2)), np.repeat([0.0, 1.0, 2.0], 3)])
+    z, slopes, variances, scales = (
+        rng.standard_normal((9, SIZE)),
+        np.full(1, 0.5),
+        np.linspace(0.1, 9.0, SIZE),
+        np.ones(1),
+    )
+    table = np.column_stack([rows[:, :2], rows[:, 3], rows[:, 3] ** 2 - rows[:, 3], rows[:, 1] ** 2 - 1.0])
+    mean, covariance = regression(table, z, slopes, variances, scales)
+    found = replace(emulator({"push": np.zeros(SIZE)}), mean=mean, covariance=covariance, information=table.T @ table)
+    asked = np.array([[1.0, 0.5, 1.5, 0.75, -0.75], [1.0, -1.0, 0.0, 0.0, 0.0]])
+    expected = np.zeros((2, 2))
+    for pour in range(9):
+        noisy = z.copy()
+        noisy[pour] += 1.0
+        moved = asked @ (regression(table, noisy, slopes, variances, scales)[0] - mean).T
+        expected += moved @ moved.T
+    assert found.scatter(asked) == pytest.approx(expected)
+    assert found.placed(asked[:1] * [1, 0, 1, 1, 0], np.array([[0.5]])) == pytest.approx(asked[:1])
 
 
 def test_without_effects_it_is_the_ratio_of_two_densities():
