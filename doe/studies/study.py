@@ -6,6 +6,7 @@ The designs of the stages are Plackett–Burman of 28 and of 12 runs and Box–B
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -366,6 +367,7 @@ def study_from(table: Settings, path: Path) -> Study:
     readings = [*given, *(f"{name}/{one}" for name, other in experiments.items() for one in observable_names(other))]
     for target in file.target:
         one_of(target.observable, "target.observable", readings)
+        _require_possible(target)
     if experiment_of(file.target[0].observable):
         raise StudyFileError(
             f"target.observable: the first target, {file.target[0].observable}, has to be of the "
@@ -402,6 +404,16 @@ def study_from(table: Settings, path: Path) -> Study:
         further=_further(file.stage),
         experiments=experiments,
     )
+
+
+def _require_possible(target: Target) -> None:
+    """Refuse a mean that no measurement can give; one of a model (``before_mean``) may be any."""
+    known = OBSERVABLES[target.observable.rpartition("/")[2]]
+    if not known.is_possible(target.mean):
+        low, high = known.possible
+        unit = "" if known.unit == "1" else f" {known.unit}"
+        allowed = f"{low:g} … {high:g}{unit}" if high < math.inf else f"{low:g}{unit} and more"
+        raise StudyFileError(f"target.mean: {target.mean:g}{unit} of {target.observable}; allowed: {allowed}")
 
 
 def _experiments(material: Scene, table: Settings, path: Path, factors: Sequence[Factor]) -> dict[str, Scene]:

@@ -17,7 +17,7 @@ from doe.studies.study import CALIBRATED
 from explorer.diagnosis.piles import model_scene
 from explorer.diagnosis.result import SHORT_PROFILE
 from explorer.scene.text import material_toml
-from solver import EFFECTS, Scene, observable_names, parameters, value
+from solver import EFFECTS, OBSERVABLES, Scene, observable_names, parameters, value
 
 SHORT = {"pilot_runs": 6, "change_runs": 3, "ascent_replicates": 1, "verification_runs": 6} | {
     f"{part}_replicates": 1 for part in ("screening", "assumption", "scan", "surface")
@@ -106,7 +106,12 @@ def _targets(condition: Condition, diagnosis: Diagnosis, scene: Scene) -> list[d
         return []
     sd = measured.deviation
     missed = np.abs(before.mean(axis=0) - rows.mean(axis=0)) / np.where(sd > 0.0, sd, np.inf)
-    allowed = [k for k, name in enumerate(names) if name in observable_names(scene) and sd[k] > 0.0]
+    given = set(observable_names(scene))
+    allowed = [
+        k
+        for k, (name, mean) in enumerate(zip(names, rows.mean(axis=0), strict=True))
+        if name in given and sd[k] > 0.0 and OBSERVABLES[name].is_possible(float(mean))
+    ]
     order = sorted(allowed, key=lambda k: (names[k] != "angle_of_repose_deg", -missed[k]))
     return [
         {

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from solver.effects.effect import Telltale
-from solver.observables.observable import Value, of_record
+from solver.observables.observable import AT_LEAST_0, SHARE, Value, of_record
 from solver.rigs.rig import DISCHARGE
 
 if TYPE_CHECKING:
@@ -89,10 +89,10 @@ def _time_of_share(share: float, record: Record) -> float:
 
 FLOW, PACKING = Telltale.FLOW, Telltale.PACKING
 OBSERVABLES = (
-    of_record("discharge_t10_s", "s", discharge_t10, FLOW, PACKING, group=DISCHARGE),
-    of_record("discharge_t50_s", "s", discharge_t50, FLOW, PACKING, group=DISCHARGE),
-    of_record("discharge_t90_s", "s", discharge_t90, FLOW, PACKING, group=DISCHARGE),
-    of_record("discharge_time_s", "s", discharge_time, FLOW, PACKING, group=DISCHARGE),
-    of_record("residual_mass_kg", "kg", residual_mass, FLOW, PACKING, group=DISCHARGE),
-    of_record("left_domain_fraction", "1", left_domain_fraction, FLOW, group=DISCHARGE),
+    of_record("discharge_t10_s", "s", discharge_t10, FLOW, PACKING, group=DISCHARGE, possible=AT_LEAST_0),
+    of_record("discharge_t50_s", "s", discharge_t50, FLOW, PACKING, group=DISCHARGE, possible=AT_LEAST_0),
+    of_record("discharge_t90_s", "s", discharge_t90, FLOW, PACKING, group=DISCHARGE, possible=AT_LEAST_0),
+    of_record("discharge_time_s", "s", discharge_time, FLOW, PACKING, group=DISCHARGE, possible=AT_LEAST_0),
+    of_record("residual_mass_kg", "kg", residual_mass, FLOW, PACKING, group=DISCHARGE, possible=AT_LEAST_0),
+    of_record("left_domain_fraction", "1", left_domain_fraction, FLOW, group=DISCHARGE, possible=SHARE),
 )

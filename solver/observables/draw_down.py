@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from solver.effects.effect import Telltale
-from solver.observables.observable import Value, mean_value, of_record
+from solver.observables.observable import ANGLE, Value, mean_value, of_record
 from solver.observables.repose import flank_angles_deg
 from solver.observables.silhouette import PIXEL, largest_part, silhouette
 from solver.rigs.draw_down_box import DrawDownBox
@@ -67,7 +67,7 @@ def _part(spheres: Spheres, chosen: npt.NDArray[np.bool_], floor: float) -> Sphe
 
 SHAPE = Telltale.SHAPE
 OBSERVABLES = (
-    of_record("draw_down_angle_deg", "deg", draw_down_angle, SHAPE, group=DRAW_DOWN),
-    of_record("draw_down_angle_left_deg", "deg", draw_down_angle_left, SHAPE, group=DRAW_DOWN),
-    of_record("draw_down_angle_right_deg", "deg", draw_down_angle_right, SHAPE, group=DRAW_DOWN),
+    of_record("draw_down_angle_deg", "deg", draw_down_angle, SHAPE, group=DRAW_DOWN, possible=ANGLE),
+    of_record("draw_down_angle_left_deg", "deg", draw_down_angle_left, SHAPE, group=DRAW_DOWN, possible=ANGLE),
+    of_record("draw_down_angle_right_deg", "deg", draw_down_angle_right, SHAPE, group=DRAW_DOWN, possible=ANGLE),
 )

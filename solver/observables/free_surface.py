@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from solver.effects.effect import Telltale
-from solver.observables.observable import Value, mean_value, of_record
+from solver.observables.observable import TILT, Value, mean_value, of_record
 from solver.observables.silhouette import PIXEL, column_tops, largest_part, silhouette
 from solver.rigs.rig import FREE_SURFACE
 
@@ -129,7 +129,7 @@ def _during(surface: FreeSurface, moments: npt.NDArray[np.int64]) -> FreeSurface
 
 SHAPE, FLOW = Telltale.SHAPE, Telltale.FLOW
 OBSERVABLES = (
-    of_record("dynamic_angle_deg", "deg", dynamic_angle, SHAPE, FLOW, group=FREE_SURFACE),
-    of_record("slope_deg", "deg", slope, SHAPE, FLOW, group=FREE_SURFACE),
-    of_record("slope_core_deg", "deg", slope_core, SHAPE, FLOW, group=FREE_SURFACE),
+    of_record("dynamic_angle_deg", "deg", dynamic_angle, SHAPE, FLOW, group=FREE_SURFACE, possible=TILT),
+    of_record("slope_deg", "deg", slope, SHAPE, FLOW, group=FREE_SURFACE, possible=TILT),
+    of_record("slope_core_deg", "deg", slope_core, SHAPE, FLOW, group=FREE_SURFACE, possible=TILT),
 )

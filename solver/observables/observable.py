@@ -8,6 +8,7 @@ own (``solver/plugins.py``). Every rig that gives its group gives it; page, stud
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
@@ -19,6 +20,16 @@ from solver.observables.reading import PileReading
 
 if TYPE_CHECKING:
     from solver.pours.record import Record
+
+Range = tuple[float, float]
+
+ANY: Range = (-math.inf, math.inf)
+ANGLE: Range = (0.0, 90.0)
+"""Of an angle with the horizontal [°]."""
+TILT: Range = (-90.0, 90.0)
+"""Of an angle whose sign says which way it falls [°]."""
+SHARE: Range = (0.0, 1.0)
+AT_LEAST_0: Range = (0.0, math.inf)
 
 
 @dataclass(frozen=True)
@@ -50,6 +61,13 @@ class Observable:
     """Whether a study weighs it up, unasked, as the response of its screening: an estimator of the angle of repose."""
     scanned: bool = False
     """Whether it is read, unasked, off a measured scan."""
+    possible: Range = ANY
+    """Least and largest value that can be measured, ends included, in ``unit``."""
+
+    def is_possible(self, value: float) -> bool:
+        """Whether ``value``, in ``unit``, can be measured."""
+        low, high = self.possible
+        return low <= value <= high
 
 
 @dataclass(frozen=True)
@@ -82,10 +100,11 @@ def of_pile(
     label: str = "",
     estimator: bool = False,
     scanned: bool = False,
+    possible: Range = ANY,
 ) -> Observable:
     """An observable that a pile alone gives, a simulated one or a scan; documented by its function's first line."""
     text = doc or first_line(function)
-    return Observable(name, unit, text, function, "pile", group, telltales, label, estimator, scanned)
+    return Observable(name, unit, text, function, "pile", group, telltales, label, estimator, scanned, possible)
 
 
 def of_record(
@@ -95,9 +114,12 @@ def of_record(
     *telltales: Telltale,
     group: str,
     scanned: bool = False,
+    possible: Range = ANY,
 ) -> Observable:
     """An observable of a whole run; documented by its function's first line."""
-    return Observable(name, unit, first_line(function), function, "record", group, telltales, scanned=scanned)
+    return Observable(
+        name, unit, first_line(function), function, "record", group, telltales, scanned=scanned, possible=possible
+    )
 
 
 def first_line(function: Callable[..., object]) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from solver.effects.effect import Telltale
-from solver.observables.observable import Value, of_pile, of_record
+from solver.observables.observable import AT_LEAST_0, SHARE, Value, of_pile, of_record
 from solver.observables.reading import PileReading
 from solver.rigs.rig import PILE
 
@@ -45,6 +45,6 @@ def _inner_density(reading: PileReading, per_mass: npt.NDArray[np.float64]) -> f
 
 
 OBSERVABLES = (
-    of_pile("bulk_density_kg_m3", "kg/m3", bulk_density, Telltale.PACKING, group=PILE),
-    of_record("solid_fraction", "1", solid_fraction, Telltale.PACKING, group=PILE, scanned=True),
+    of_pile("bulk_density_kg_m3", "kg/m3", bulk_density, Telltale.PACKING, group=PILE, possible=AT_LEAST_0),
+    of_record("solid_fraction", "1", solid_fraction, Telltale.PACKING, group=PILE, scanned=True, possible=SHARE),
 )

@@ -38,7 +38,7 @@ import numpy as np
 import numpy.typing as npt
 
 from solver.effects.effect import Telltale
-from solver.observables.observable import Observable, Value, mean_value, of_pile
+from solver.observables.observable import ANGLE, AT_LEAST_0, SHARE, Observable, Value, mean_value, of_pile
 from solver.observables.reading import PileReading
 from solver.observables.silhouette import PIXEL, column_tops
 from solver.observables.surface import height_map, radial_profile, radius_holding
@@ -122,6 +122,7 @@ def view(name: str, azimuth_deg: float) -> Observable:
         angle_of_repose_at(azimuth_deg),
         SHAPE,
         group=PILE,
+        possible=ANGLE,
         doc=f"Silhouette flank fit, view from azimuth {azimuth_deg:g}°, mean of both flanks.",
         scanned=True,
     )
@@ -215,10 +216,29 @@ OBSERVABLES = (
         group=PILE,
         label="angle of repose, silhouette",
         estimator=True,
+        possible=ANGLE,
         scanned=True,
     ),
-    of_pile("angle_of_repose_left_deg", "deg", angle_of_repose_left, SHAPE, ASYMMETRY, group=PILE, scanned=True),
-    of_pile("angle_of_repose_right_deg", "deg", angle_of_repose_right, SHAPE, ASYMMETRY, group=PILE, scanned=True),
+    of_pile(
+        "angle_of_repose_left_deg",
+        "deg",
+        angle_of_repose_left,
+        SHAPE,
+        ASYMMETRY,
+        group=PILE,
+        scanned=True,
+        possible=ANGLE,
+    ),
+    of_pile(
+        "angle_of_repose_right_deg",
+        "deg",
+        angle_of_repose_right,
+        SHAPE,
+        ASYMMETRY,
+        group=PILE,
+        scanned=True,
+        possible=ANGLE,
+    ),
     *(view("angle_of_repose_deg", azimuth) for azimuth in (0, 45, 90, 135)),
     of_pile(
         "angle_of_repose_above_one_body_deg",
@@ -228,6 +248,7 @@ OBSERVABLES = (
         group=PILE,
         label="angle of repose, silhouette above one body",
         estimator=True,
+        possible=ANGLE,
     ),
     of_pile(
         "angle_of_repose_cone_deg",
@@ -237,6 +258,7 @@ OBSERVABLES = (
         group=PILE,
         label="angle of repose, mean cone",
         estimator=True,
+        possible=ANGLE,
     ),
     of_pile(
         "angle_of_repose_mass_cone_deg",
@@ -246,6 +268,7 @@ OBSERVABLES = (
         group=PILE,
         label="angle of repose, centre-of-mass cone",
         estimator=True,
+        possible=ANGLE,
     ),
     of_pile(
         "angle_of_repose_volume_cone_deg",
@@ -255,13 +278,14 @@ OBSERVABLES = (
         group=PILE,
         label="angle of repose, volume cone",
         estimator=True,
+        possible=ANGLE,
     ),
-    of_pile("apex_height_m", "m", apex_height, SHAPE, PACKING, group=PILE, scanned=True),
-    of_pile("centre_height_m", "m", centre_height, SHAPE, PACKING, group=PILE, scanned=True),
-    of_pile("footprint_r50_m", "m", footprint_r50, SHAPE, group=PILE, scanned=True),
-    of_pile("footprint_r90_m", "m", footprint_r90, SHAPE, FLOW, group=PILE, scanned=True),
+    of_pile("apex_height_m", "m", apex_height, SHAPE, PACKING, group=PILE, scanned=True, possible=AT_LEAST_0),
+    of_pile("centre_height_m", "m", centre_height, SHAPE, PACKING, group=PILE, scanned=True, possible=AT_LEAST_0),
+    of_pile("footprint_r50_m", "m", footprint_r50, SHAPE, group=PILE, scanned=True, possible=AT_LEAST_0),
+    of_pile("footprint_r90_m", "m", footprint_r90, SHAPE, FLOW, group=PILE, scanned=True, possible=AT_LEAST_0),
     of_pile("centroid_x_m", "m", centroid_x, ASYMMETRY, group=PILE, scanned=True),
     of_pile("centroid_y_m", "m", centroid_y, ASYMMETRY, group=PILE, scanned=True),
-    of_pile("stray_fraction", "1", stray_fraction, FLOW, group=PILE, scanned=True),
+    of_pile("stray_fraction", "1", stray_fraction, FLOW, group=PILE, scanned=True, possible=SHARE),
 )
 """What is read off a pile on the plate, in the order of tables."""

@@ -79,6 +79,19 @@ def test_bodies_touched_by_a_factor(path, bodies):
         (lambda t: t["change"][0].update(values={"rig.nothing": 1}), "no such parameter"),
         (lambda t: t.update(format=2), "format: 2; allowed: 1"),
         (lambda t: t["target"][0].update(observable="angle"), r"target\.observable: 'angle' is not one of angle_of"),
+        (
+            lambda t: t["target"][0].update(mean=-5.0),
+            r"target\.mean: -5 deg of angle_of_repose_deg; allowed: 0 … 90 deg",
+        ),
+        (lambda t: t["target"][0].update(mean=95.0), r"target\.mean: 95 deg of .*; allowed: 0 … 90 deg"),
+        (
+            lambda t: t["target"].append({"observable": "residual_mass_kg", "mean": -0.02}),
+            r"target\.mean: -0\.02 kg of residual_mass_kg; allowed: 0 kg and more",
+        ),
+        (
+            lambda t: t["target"].append({"observable": "solid_fraction", "mean": 58.0}),
+            r"target\.mean: 58 of solid_fraction; allowed: 0 … 1$",
+        ),
         (lambda t: t["target"][0].update(mean="24.68"), r"target\.mean: '24\.68' is not a number"),
         (lambda t: t["target"][0].update(sd=-1.0), r"target\.sd: -1 is below 0"),
         (lambda t: t["target"][0].update(sd=True), r"target\.sd: True is not a number"),
@@ -141,6 +154,11 @@ def study_with(change):
     table = copy.deepcopy(TABLE)
     change(table)
     return study_from(table, PATH)
+
+
+def test_what_an_earlier_model_gave_may_be_no_measured_value():
+    study = study_with(lambda t: t["target"][0].update(before_mean=-0.4, before_sd=0.2, before_n=6))
+    assert study.targets[0].before_mean == -0.4
 
 
 def test_the_observables_of_targets_are_always_among_the_estimators():

@@ -43,6 +43,22 @@ def test_its_targets_are_measured_and_hold_what_the_declared_model_gave(tmp_path
         assert target.before_n == len(found.before.blocks[0])
 
 
+def test_a_number_that_no_study_takes_is_no_target(tmp_path):
+    measurement, found = diagnosed(**CASES["effect"])
+    (tmp_path / "corrected.toml").write_text(corrected_toml(measurement, found), encoding="utf-8")
+    path = tmp_path / "corrected_study.toml"
+    path.write_text(study_toml(measurement, found, "corrected.toml"), encoding="utf-8")
+    first = load_study(str(path)).targets[0]
+    assert first.observable == "angle_of_repose_deg"
+    turned = tuple(
+        replace(one, values=-one.values) if one.observable == first.observable else one
+        for one in measurement.fit[0].observations
+    )
+    conditions = (replace(measurement.fit[0], observations=turned), *measurement.conditions[1:])
+    path.write_text(study_toml(replace(measurement, conditions=conditions), found, "corrected.toml"), encoding="utf-8")
+    assert first.observable not in [target.observable for target in load_study(str(path)).targets]
+
+
 def test_the_targets_of_a_single_curve_have_the_uncertainty_that_is_stated(tmp_path):
     measurement, found = diagnosed(**CASES["effect"])
     single = []

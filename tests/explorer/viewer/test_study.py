@@ -339,6 +339,8 @@ def test_ranges_and_target_are_asked_for_as_entered(table):
     other = x7(ranges)
     ranges.enter(other, (0.5, *ranges.value(other)[1:]))
     assert set(started_with(table).factors) == {"X4", "X7"}
+    ranges.enter(TARGET, 95.0)
+    assert "**This study cannot start:** changed study: target.mean: 95 deg of" in ranges.text
     ranges.enter(X4, (90.0, 70.5, 56.3))
     assert "**This study cannot start:** " in ranges.text
     assert "is not below high" in ranges.text

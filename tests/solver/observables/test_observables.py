@@ -46,6 +46,16 @@ def test_units_agree_with_names():
             assert observable.name.split("@")[0].endswith(suffixes[observable.unit])
 
 
+def test_what_can_be_measured_agrees_with_the_unit():
+    for observable in OBSERVABLES.values():
+        low, high = observable.possible
+        assert low < high
+        signed = observable.name.startswith(("centroid", "slope", "dynamic"))
+        assert signed == observable.is_possible(-1e-6)
+        assert (observable.unit == "deg") == (high == 90.0)
+        assert (observable.unit == "1") == (high == 1.0)
+
+
 def test_a_pile_gives_every_value_finite_and_in_its_unit(seeds):
     values = observe(poured(seeds))
     given = observables_in(Funnel())
@@ -53,6 +63,7 @@ def test_a_pile_gives_every_value_finite_and_in_its_unit(seeds):
         assert values[name].unit == OBSERVABLES[name].unit
     assert set(values) == set(given) | {f"{o.name}.{component}" for o in COMPONENT_OBSERVABLES for component in "abc"}
     assert all(np.isfinite(value.value) for value in values.values())
+    assert all(OBSERVABLES[name].is_possible(values[name].value) for name in given)
 
 
 @pytest.mark.parametrize("n", [0, 1, 2])
