@@ -74,6 +74,9 @@ def export(
     if caution:
         typer.echo(f"note: {caution}", err=True)
     scene = with_settings(scene, set_)
+    longest = scene.numerics.duration or scene.numerics.max_time
+    if time is not None and time > longest and not target.goes_on:
+        raise CommandError(f"--time {time:g}: the pour for --to {to} lasts {longest:g} s at most; allowed: up to that")
     if time is not None and time < float(value(scene, "numerics.max_time")):
         try:
             scene = with_values(scene, {"numerics.max_time": time})

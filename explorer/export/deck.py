@@ -118,6 +118,7 @@ class Deck:
 class DeckTarget(ExportTarget):
     """An engine that repeats a pour of ours from a deck."""
 
+    goes_on = True
     holds: tuple[str, ...] = ()
     """Effects of contacts and flight that its law has as well."""
     laws: tuple[str, ...] = (HertzMindlin.name,)

@@ -19,9 +19,11 @@ import numpy.typing as npt
 
 from explorer.errors import CommandError
 from explorer.export.target import ExportOrder, ExportTarget
+from explorer.outcomes import outcome_text
 from explorer.scene.meshes import GATE_NAME, Triangles, body_triangles, rig_triangles
 from solver import Bodies, Record, Scene, Spheres, value
 from solver.pours.contacts import Contacts, loads
+from solver.pours.record import Outcome
 from solver.pours.record_builder import member_spheres
 from solver.rigs import Rig
 from solver.scenes.insertion import rotation_matrix
@@ -118,7 +120,10 @@ class Paraview(ExportTarget):
         """Pour, and write the moments of it."""
         seen, record = moments(order.scene, order.seed, order.every)
         write_paraview(folder, record.scene, seen, order.seed, str(record.outcome))
-        return f"{len(seen)} moment(s), the last at {seen[-1].time:.4g} s; what is in them: README.txt"
+        last = f"the last at {seen[-1].time:.4g} s"
+        if order.time is not None and record.outcome != Outcome.TIME_LIMIT:
+            last += f", where the pour ended before --time {order.time:g} ({outcome_text(record.outcome)})"
+        return f"{len(seen)} moment(s), {last}; what is in them: README.txt"
 
 
 PARAVIEW = Paraview()

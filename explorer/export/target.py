@@ -35,6 +35,8 @@ class ExportTarget(Protocol):
     """Whether the pour runs here first."""
     of_material: bool = False
     """Whether it takes nothing of a pour, neither its seed nor its time."""
+    goes_on: bool = False
+    """Whether the other program can simulate for longer than the pour that runs here."""
     options: tuple[str, ...] = ()
     """Options of the command that not every target takes: ``every``."""
     extra: str = ""

@@ -1,5 +1,6 @@
 """A pour as VTK files, read back by the library that wrote them."""
 
+import dataclasses
 import sys
 import xml.etree.ElementTree as ET
 
@@ -8,7 +9,17 @@ import pytest
 import trimesh
 
 from explorer.errors import CommandError
-from explorer.export.paraview import PourState, collection, contact_grid, moments, rig_grid, shape_grid, write_paraview
+from explorer.export.paraview import (
+    PARAVIEW,
+    PourState,
+    collection,
+    contact_grid,
+    moments,
+    rig_grid,
+    shape_grid,
+    write_paraview,
+)
+from explorer.export.target import ExportOrder
 from explorer.scene.file import load_scene, with_settings
 from solver.pours.contacts import Contacts
 from solver.pours.record import Outcome
@@ -138,6 +149,17 @@ def test_several_moments_are_a_collection(poured, tmp_path):
 
 def test_a_collection_escapes_its_names():
     assert "a&amp;b.vtu" in collection([(0.0, "a&b.vtu")])
+
+
+@pytest.mark.parametrize("ended", [True, False])
+def test_a_pour_that_ends_before_the_time_that_is_asked_for_says_so(ended, poured, tmp_path, monkeypatch):
+    pytest.importorskip("meshio")
+    seen, record = poured
+    outcome = Outcome.AT_REST if ended else Outcome.TIME_LIMIT
+    made = (seen, dataclasses.replace(record, outcome=outcome))
+    monkeypatch.setattr("explorer.export.paraview.moments", lambda *_: made)
+    told = PARAVIEW.write(tmp_path, ExportOrder(record.scene, 5, time=0.3))
+    assert (", where the pour ended before --time 0.3 (at rest); what" in told) == ended
 
 
 def test_without_the_library_it_is_one_line_before_anything_is_poured(tmp_path, monkeypatch):

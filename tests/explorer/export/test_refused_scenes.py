@@ -100,6 +100,14 @@ def test_a_restitution_that_liggghts_cannot_have_is_refused_before_the_pour():
         EXPORTS["liggghts"].check(scene)
 
 
+@pytest.mark.parametrize(("settings", "longest"), [((), 8), (("--set", "numerics.duration=3s"), 3)])
+def test_a_time_beyond_the_end_of_the_pour_is_refused_where_nothing_simulates_on(settings, longest, tmp_path):
+    line = refused(explorer("export", "funnel", tmp_path / "new", "--to", "paraview", "--time", 100, *settings))
+    assert line == f"--time 100: the pour for --to paraview lasts {longest} s at most; allowed: up to that"
+    assert not (tmp_path / "new").exists()
+    assert [name for name, one in EXPORTS.items() if one.goes_on] == ["liggghts", "yade"]
+
+
 @pytest.mark.parametrize("time", ["0.05", "inf", "nan"])
 def test_a_time_that_no_pour_has_is_refused_by_its_own_name(time, tmp_path):
     line = refused(explorer("export", "funnel", tmp_path / "new", "--to", "yade", "--time", time))
