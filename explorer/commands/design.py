@@ -101,7 +101,9 @@ def design(
         None, help="Standard deviation of one run; prints which effects the design can detect."
     ),
     effect: float | None = typer.Option(
-        None, help="With --sigma: size of a change; prints the probability of detecting it."
+        None,
+        help="Size of a change, in the response's unit, without --sigma in standard deviations of one run; prints the "
+        "probability of detecting it.",
     ),
     report: Path | None = report_option("plan.json", "--report"),
     author: str = AUTHOR,

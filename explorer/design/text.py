@@ -121,7 +121,9 @@ def _power_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: f
         ]
         for one in found
     ]
-    table = text_table([*header, f"chance to see {number(effect)}"] if effect else header, rows)
+    if effect:
+        header.append(f"chance to see {number(effect)}{'' if sigma else ' σ'}")
+    table = text_table(header, rows)
     names = f"\n{OF_NAMES}" if any(one.df_term > 1 for one in found) else ""
     return (
         f"what the {planned_order(plan, file)} model will see at p < 0.05, in {unit} "

@@ -170,9 +170,10 @@ def _power(result: PlanResult) -> Section:
     found = [one for one in result.power if math.isfinite(one.smallest)]
     if not found:
         return Section("What it will see", ())
-    unit = "unit of the response" if math.isfinite(result.sigma) else "σ, the standard deviation of one run"
+    in_sigma = not math.isfinite(result.sigma)
+    unit = "σ, the standard deviation of one run" if in_sigma else "unit of the response"
     effects = [one for one in found if math.isfinite(one.power)]
-    asked = f"chance to see {number(effects[0].effect)}" if effects else ""
+    asked = f"chance to see {number(effects[0].effect)}{' σ' if in_sigma else ''}" if effects else ""
     rows = tuple(
         (
             TERMS[one.kind],

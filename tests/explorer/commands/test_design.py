@@ -462,6 +462,17 @@ def test_power_is_in_the_plain_data(tmp_path, process):
     assert 0.5 < factor["power"] < 1
 
 
+def test_a_change_without_sigma_is_of_so_many_standard_deviations(tmp_path, process):
+    order = ("design", "factorial", "--factors", process, "--replicates", 4)
+    said = explorer(*order, "--effect", 1.5, "--out", tmp_path / "a.csv").stdout
+    assert "chance to see 1.5 σ" in said
+    with_sigma = explorer(*order, "--sigma", 2, "--effect", 3, "--out", tmp_path / "b.csv").stdout
+    assert "chance to see 3\n" in with_sigma
+    last = [[line.split()[-1] for line in text.splitlines() if line.startswith("of a")] for text in (said, with_sigma)]
+    assert last[0] == last[1] != []
+    assert "standard deviations of one run" in " ".join(explorer("design", "--help").stdout.split())
+
+
 def test_only_some_factors_leave_the_others_to_the_scatter(tmp_path):
     path, _ = made(tmp_path, "factorial", "--factors", many_factors(tmp_path, 4), "--standard-order")
     result = analysed(fill(path, FILTRATION_RATE), "--only", "f1,f3,f4", "--model", "interactions")
