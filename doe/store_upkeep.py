@@ -25,7 +25,7 @@ class Checked:
     runs: dict[str, int]
     """Study → runs."""
     size: int
-    """[bytes]"""
+    """[bytes], with the log beside it."""
     damaged: tuple[str, ...]
     """One line for each run whose raw pour cannot be read, and for what SQLite complains of; none in a whole store."""
 
@@ -47,7 +47,13 @@ def check(path: Path) -> Checked:
             runs[run.study] += 1
             if (line := _unreadable(run)) is not None:
                 complaints.append(line)
-        return Checked(store.physics, dict(runs), path.stat().st_size, tuple(complaints))
+        return Checked(store.physics, dict(runs), size(path), tuple(complaints))
+
+
+def size(path: Path) -> int:
+    """What a store takes on the disk [bytes], with the log beside it, which holds what was written last."""
+    log = Path(f"{path}-wal")
+    return path.stat().st_size + (log.stat().st_size if log.is_file() else 0)
 
 
 def export(path: Path, to: Path, study: str) -> int:
@@ -123,6 +129,8 @@ def prune(path: Path, study: str) -> int:
 def bits(raw: bytes) -> bytes:
     """A raw pour without the time that it took, which alone differs when it is poured again.
 
+        # While others have the store open, the file gets shorter only by this.
+        db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     Raises RawPourError for one that cannot be read.
     """
     return packed(dataclasses.replace(unpacked(raw), wall_s=0.0))

@@ -82,6 +82,7 @@ def prune(
         number = store_upkeep.count(path, study)
         typer.echo(f"{path}: {number} runs of {study} would be removed; add --yes")
         return
-    before = path.stat().st_size
+    before = store_upkeep.size(path)
     number = store_upkeep.prune(path, study)
-    typer.echo(f"{path}: {number} runs of {study} removed, {(before - path.stat().st_size) / 1e6:.1f} MB given back")
+    freed = max(0, before - store_upkeep.size(path))
+    typer.echo(f"{path}: {number} runs of {study} removed, {freed / 1e6:.1f} MB given back")

@@ -40,6 +40,23 @@ def test_a_whole_store_is_counted(ours):
     assert found.size == ours.stat().st_size
 
 
+def test_what_is_still_in_the_log_of_a_store_in_use_counts_as_its_size(tmp_path):
+    path, log = tmp_path / "r.sqlite", tmp_path / "r.sqlite-wal"
+    with closing(Store(path)) as store:
+        for n in range(40):
+            store.add(another(key=f"k{n}", study="st"[n % 2]))
+        whole = path.stat().st_size + log.stat().st_size
+        assert log.stat().st_size > path.stat().st_size
+        assert store_upkeep.check(path).size == whole
+        told = explorer("store", "check", "--store", path).output
+        assert f"40 runs, {whole / 1e6:.1f} MB" in told
+        assert "0.0 MB" not in told
+        # What is removed is given back although the store is open elsewhere.
+        told = explorer("store", "prune", "--study", "t", "--store", path, "--yes").output
+        assert f"20 runs of t removed, {(whole - store_upkeep.size(path)) / 1e6:.1f} MB given back" in told
+        assert path.stat().st_size + log.stat().st_size < 0.6 * whole
+
+
 def test_a_damaged_raw_pour_is_named_and_costs_exit_code_1(tmp_path):
     path = store_of(tmp_path / "r.sqlite", RUN, another(key="k2", raw=RUN.raw[:-100]))
     told = explorer("store", "check", "--store", path)
