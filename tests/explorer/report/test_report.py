@@ -25,13 +25,14 @@ pytestmark = pytest.mark.usefixtures("unprinted")
 
 
 @pytest.fixture(scope="module")
-def results():
+def studies():
+    """The content of the file of every made-up study, by its case."""
     return {name: result_of_case(name) for name in CASES}
 
 
 @pytest.fixture(params=CASES)
-def result(request, results):
-    return results[request.param]
+def result(request, studies):
+    return studies[request.param]
 
 
 def figures_of(result):
@@ -199,20 +200,20 @@ def test_contours_pass_through_the_optimum(result):
 # One property of one variant
 
 
-def test_pareto_has_both_errors_and_both_limits(results):
-    result = results["planted"]
+def test_pareto_has_both_errors_and_both_limits(studies):
+    result = studies["planted"]
     spec, analysis = charts_in(report_html(typed(result)))["pareto"], result["screening"]["analysis"]
     for name, key in (("replicates", "pure_error"), ("dummies", "dummy_error")):
         sizes = [abs(e[f"by_{name}"]["t"]) for e in analysis["effects"] if e[f"by_{name}"] is not None]
         assert sorted(t for t in trace(spec, name)["x"] if t is not None) == sorted(sizes)
         drawn = {shape["x0"] for shape in spec["layout"]["shapes"]}
         assert {analysis[key]["t_limit"], analysis[key]["t_limit_bonferroni"]} <= drawn
-    quick = figures_of(results["one pour per row"])["pareto"]
+    quick = figures_of(studies["one pour per row"])["pareto"]
     assert [entry["name"] for entry in quick["data"]] == ["dummies"]
 
 
-def test_ascent_and_scan_charts_hold_means_and_intervals(results):
-    result = results["planted"]
+def test_ascent_and_scan_charts_hold_means_and_intervals(studies):
+    result = studies["planted"]
     charts = charts_in(report_html(typed(result)))
     walk = trace(charts["ascent"], "mean, 95 % interval")
     assert walk["y"] == result["ascent"]["means"]
@@ -222,28 +223,28 @@ def test_ascent_and_scan_charts_hold_means_and_intervals(results):
     assert scan["y"] == result["scan"]["means"]
 
 
-def test_bootstrap_cloud_holds_every_refit(results):
-    single = results["planted"]["optimum"]["single"]
-    drawn = trace(figures_of(results["planted"])["cloud"], "bootstrap refits")
+def test_bootstrap_cloud_holds_every_refit(studies):
+    single = studies["planted"]["optimum"]["single"]
+    drawn = trace(figures_of(studies["planted"])["cloud"], "bootstrap refits")
     modulus = single["names"].index("X4")
     assert modulus < 2  # the first panel shows the first two factors
     axis = drawn[("x", "y")[modulus]]
     assert axis == [point[modulus] / 1e6 for point in single["bootstrap_points"]]
 
 
-def test_stages_that_did_not_run_leave_no_section(results):
-    bare = {section.title for section in sections_of(typed(results["no assumptions, no scan"]))}
-    full = {section.title for section in sections_of(typed(results["planted"]))}
+def test_stages_that_did_not_run_leave_no_section(studies):
+    bare = {section.title for section in sections_of(typed(studies["no assumptions, no scan"]))}
+    full = {section.title for section in sections_of(typed(studies["planted"]))}
     assert full - bare == {"Over the outlet height", "Compared with the paper"}
-    text = visible(report_html(typed(results["no assumptions, no scan"])))
+    text = visible(report_html(typed(studies["no assumptions, no scan"])))
     assert "this study declares no assumption" in text
-    stripped = copy.deepcopy(results["no assumptions, no scan"])
+    stripped = copy.deepcopy(studies["no assumptions, no scan"])
     stripped["study"]["assumed"] = []
     assert "What the source does not state" not in {section.title for section in sections_of(typed(stripped))}
 
 
-def test_hostile_names_stay_text(results):
-    result = copy.deepcopy(results["planted"])
+def test_hostile_names_stay_text(studies):
+    result = copy.deepcopy(studies["planted"])
     result["study"] |= {"name": HOSTILE, "title": HOSTILE}
     for part in (result["ascent"], result["surface"], result["optimum"]):
         part["factors"][0]["name"] = HOSTILE
@@ -267,19 +268,19 @@ def test_embedded_json_cannot_end_its_element():
     assert json.loads(text)["data"] == ["</script><!--"]
 
 
-def test_paper_is_compared_only_for_its_own_study(results):
-    text = report_markdown(typed(results["planted"]))
+def test_paper_is_compared_only_for_its_own_study(studies):
+    text = report_markdown(typed(studies["planted"]))
     for printed in ("25.96°, 25.31°, 23.47°", "24.91°", "0.923 %", "0.827", "58.34 MPa", "0.608"):
         assert printed in text
-    rows = {row[0]: row for row in table(results["planted"], "factor", "parameter", "paper: sum of squares")}
+    rows = {row[0]: row for row in table(studies["planted"], "factor", "parameter", "paper: sum of squares")}
     with asset_path("source_tables", "table6_plackett_burman_anova").open(encoding="utf-8") as file:
         printed_p = {row["factor"]: row["p_value"] for row in csv.DictReader(io.StringIO(file.read()))}
     assert {name: row[4] for name, row in rows.items()} == {name: printed_p[name] for name in rows}
-    assert "Compared with the paper" not in report_markdown(typed(results["no assumptions, no scan"]))
+    assert "Compared with the paper" not in report_markdown(typed(studies["no assumptions, no scan"]))
 
 
-def test_cautions_say_what_the_numbers_cannot(results):
-    texts = {name: visible(report_html(typed(result))) for name, result in results.items()}
+def test_cautions_say_what_the_numbers_cannot(studies):
+    texts = {name: visible(report_html(typed(result))) for name, result in studies.items()}
     assert "went on without being significant" in texts["nothing acts"]
     assert "not better than noise" in texts["nothing acts"]
     assert "lies outside what the model reaches" in texts["out of reach"]
@@ -289,39 +290,39 @@ def test_cautions_say_what_the_numbers_cannot(results):
     assert all("is derived, not measured" in text for text in texts.values())
 
 
-def test_the_noise_table_shows_the_range_of_the_bias(results):
-    rows = {row[0]: row for row in table(results["planted"], "estimator", "mean")}
+def test_the_noise_table_shows_the_range_of_the_bias(studies):
+    rows = {row[0]: row for row in table(studies["planted"], "estimator", "mean")}
     # Third of reported_studies.BIAS: k = 3 times (0.3, 3.0, −1.5), less 0.5.
     assert rows["angle of repose, centre-of-mass cone"][-1] == "−5.0 … +8.5°"
 
 
-def test_the_page_tells_the_spread_by_setting_and_which_assumption_is_not_testable(results):
-    text = report_markdown(typed(results["planted"]))
-    pilot = results["planted"]["pilot"]
+def test_the_page_tells_the_spread_by_setting_and_which_assumption_is_not_testable(studies):
+    text = report_markdown(typed(studies["planted"]))
+    pilot = studies["planted"]["pilot"]
     assert f"Brown–Forsythe: p = {p_value(pilot['equal_variance']['p'])}" in text
     assert re.search(r"plate thickness .*acts on 3 bodies", text)
     assert "the target's own" in text
 
 
-def test_the_scan_and_the_sizes_of_a_full_profile_state_what_they_resolve(results):
-    rows = {row[0]: row for row in table(results["planted"], "stage", "pours", "valid")}
-    smallest = results["planted"]["scan"]["smallest_difference"]
+def test_the_scan_and_the_sizes_of_a_full_profile_state_what_they_resolve(studies):
+    rows = {row[0]: row for row in table(studies["planted"], "stage", "pours", "valid")}
+    smallest = studies["planted"]["scan"]["smallest_difference"]
     assert rows["scan"][4] == f"{smallest:.2f}° between two values"
-    sized = copy.deepcopy(results["planted"])
+    sized = copy.deepcopy(studies["planted"])
     size = {"stage": "ascent", "wanted": 1.0, "needed": 64, "taken": 12, "resolved": 2.39}
     sized["pilot"]["sizes"] = [size]
     assert table(sized, "stage", "pours per row needed") == [["ascent", "64", "12", "1.00°", "2.39°"]]
 
 
-def test_the_optimum_says_whether_the_target_is_taken_as_exact(results):
-    assert "the target's own standard error, 0.51°" in report_markdown(typed(results["planted"]))
-    exact = copy.deepcopy(results["planted"])
+def test_the_optimum_says_whether_the_target_is_taken_as_exact(studies):
+    assert "the target's own standard error, 0.51°" in report_markdown(typed(studies["planted"]))
+    exact = copy.deepcopy(studies["planted"])
     exact["optimum"]["single"]["target_standard_error"] = 0.0
     assert "The target is taken as exact" in report_markdown(typed(exact))
 
 
-def test_relative_error_below_the_standard_error_is_marked(results):
-    result = copy.deepcopy(results["planted"])
+def test_relative_error_below_the_standard_error_is_marked(studies):
+    result = copy.deepcopy(studies["planted"])
     test = result["verification"]["tests"][0]
     spread = 100 * test["simulated"]["sd"] / math.sqrt(test["simulated"]["n"]) / 24.68
     test["relative_error_percent"] = 0.9 * spread
@@ -330,19 +331,19 @@ def test_relative_error_below_the_standard_error_is_marked(results):
     assert "is smaller than the standard error" not in visible(report_html(typed(result)))
 
 
-def test_largest_unknown_is_named_beside_the_largest_factor(results):
-    text = report_markdown(typed(results["planted"]))
-    assumed = max((e for e in results["planted"]["assumptions"]["analysis"]["effects"] if not e["is_dummy"]),
+def test_largest_unknown_is_named_beside_the_largest_factor(studies):
+    text = report_markdown(typed(studies["planted"]))
+    assumed = max((e for e in studies["planted"]["assumptions"]["analysis"]["effects"] if not e["is_dummy"]),
                   key=lambda e: abs(e["effect"]))  # fmt: skip
     assert assumed["name"] == "outlet_height"  # planted: −6° against +8° of X7
     assert f"outlet height moves the response by {abs(assumed['effect']):.2f}°" in text
     assert "the largest factor, X7 (static friction seed–seed)" in text
 
 
-def test_command_line_repeats_the_study(results):
+def test_command_line_repeats_the_study(studies):
     command = "explorer calibrate --headless --study sunflower_extract --profile test --out results"
-    assert command in report_markdown(typed(results["planted"]))
-    own = copy.deepcopy(results["planted"])
+    assert command in report_markdown(typed(studies["planted"]))
+    own = copy.deepcopy(studies["planted"])
     own["study"] |= {"name": "mine", "file": "/home/me/my studies/mine.toml"}
     assert "--study '/home/me/my studies/mine.toml'" in report_markdown(typed(own))
     assert "--tries" not in report_markdown(typed(own))
@@ -350,12 +351,12 @@ def test_command_line_repeats_the_study(results):
     assert "--tries 6 --out results" in report_markdown(typed(own))
 
 
-def test_files_appear_complete_or_not_at_all(results, tmp_path):
-    write_report(typed(results["planted"]), tmp_path)
+def test_files_appear_complete_or_not_at_all(studies, tmp_path):
+    write_report(typed(studies["planted"]), tmp_path)
     made = {path.name for path in tmp_path.iterdir()}
     assert made == {"report.html", "report.md", "figures", "data", "references.bib"}
     before = (tmp_path / "report.md").read_text(encoding="utf-8")
-    broken = copy.deepcopy(results["planted"])
+    broken = copy.deepcopy(studies["planted"])
     del broken["verification"]["tests"][0]["simulated"]
     with pytest.raises(RecordError, match=r"^result of a study: verification\.tests\[0\]\.simulated: is missing$"):
         write_report(typed(broken), tmp_path)
@@ -363,10 +364,10 @@ def test_files_appear_complete_or_not_at_all(results, tmp_path):
 
 
 @pytest.mark.browser
-def test_browser_draws_every_chart_and_asks_for_nothing(results, tmp_path, chromium):
+def test_browser_draws_every_chart_and_asks_for_nothing(studies, tmp_path, chromium):
     from playwright.sync_api import sync_playwright
 
-    write_report(typed(results["two targets"]), tmp_path)
+    write_report(typed(studies["two targets"]), tmp_path)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         page = browser.new_page()
@@ -378,6 +379,6 @@ def test_browser_draws_every_chart_and_asks_for_nothing(results, tmp_path, chrom
         page.wait_for_function("document.querySelectorAll('.main-svg').length > 0")
         drawn = page.locator("figure .js-plotly-plot").count()
         browser.close()
-    assert drawn == len(figures_of(results["two targets"]))
+    assert drawn == len(figures_of(studies["two targets"]))
     assert [url for url in requests if not url.startswith(("file:", "data:", "blob:"))] == []
     assert errors == []
