@@ -236,7 +236,7 @@ def limit_study(
     """
     kinds = [DataKind(one.direction.effect, one.direction.name, len(one.direction.full) == 2) for one in levels]
     names = [f"{one.name} strong" for one in kinds]
-    samples = {data: sample.first(numbers).varying() for data, numbers in offered.items()}
+    samples = {data: sample.first(numbers) for data, numbers in offered.items()}
     scalars = next(iter(samples.values()))
     scale = ruler_of(scalars)
     ruler = [strength_of(scalars, name, scale) for name in names]

@@ -23,6 +23,7 @@ from doe.validation.limit import (
     limit_study,
     nearest_correlation,
 )
+from doe.validation.reference import ReferencePours
 from tests.doe.validation.test_limit_ruler import sample_of, unit
 
 SETS = 20_000
@@ -143,6 +144,22 @@ def test_a_study_of_made_up_pours():
     assert rows["scan", 6, 4.0].right >= rows["scalars", 6, 4.0].right
     assert rows["scalars", 12, 4.0].right >= rows["scalars", 6, 4.0].right
     assert found.pours["a strong"] == 192
+
+
+def test_features_that_never_vary_change_no_bit_of_a_study():
+    shifts = {
+        f"{name} {level}": share * unit(k)
+        for k, name in enumerate("ab")
+        for level, share in (("strong", 4.0), ("weak", 2.0))
+    }
+    sample = sample_of(np.random.default_rng(2), shifts)
+    blocks = {
+        kind: tuple(np.insert(block, [0, 2, *[3] * 40], 3.0, axis=1) for block in both)
+        for kind, both in sample.pours.items()
+    }
+    levels = [Level(Direction(name, name, (0.5,)), 0.5, 12.0) for name in "ab"]
+    padded = limit_study(ReferencePours(blocks, sample.parameters), levels, {"scan": [48, 48]})
+    assert padded.to_dict() == limit_study(sample, levels, {"scan": [6, 6]}).to_dict()
 
 
 def test_the_amplitude_is_sought_that_shifts_by_as_much_as_wanted():
