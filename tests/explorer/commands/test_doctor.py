@@ -54,6 +54,42 @@ def test_a_new_user_is_ready_and_nothing_is_made(home, tmp_path):
     assert not [path for path in home.rglob("*") if path.is_file()]
 
 
+@pytest.mark.parametrize(
+    ("own", "limits", "expected"),
+    [
+        ("0::/\n", {"memory.max": "2000000000"}, [2000000000]),
+        ("0::/user/me\n", {"user/memory.max": "600000000", "user/me/memory.max": "max"}, [600000000]),
+        ("0::/docker/5f/on/the/host\n", {"memory.max": "700000000"}, [700000000]),
+        (
+            "9:pids:/\n4:cpu,memory:/box\n0::/\n",
+            {"memory/box/memory.limit_in_bytes": "800000000", "memory/memory.limit_in_bytes": str(2**63 - 4096)},
+            [800000000, 2**63 - 4096],
+        ),
+        ("0::/\n", {}, []),
+    ],
+)
+def test_the_memory_of_a_container_is_its_limit(own, limits, expected, tmp_path, monkeypatch):
+    (tmp_path / "cgroup").write_text(own)
+    for name, content in limits.items():
+        file = tmp_path / "tree" / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(f"{content}\n")
+    found = list(installation.memory_limits(tmp_path / "cgroup", tmp_path / "tree"))
+    assert found == expected
+    monkeypatch.setattr(installation, "memory_limits", lambda: found)
+    monkeypatch.setattr("os.sysconf", {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 6171023}.get)
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    memory = installation._memory()
+    least = min(expected, default=2**62) / 1e9
+    assert memory.present == (least >= 1.0)
+    has = "25.3 GB" if least > 25.3 else f"{least:.1f} of 25.3 GB allowed to this process"
+    assert memory.found == f"{has}; a study on all cores takes 1.0 GB"
+
+
+def test_where_there_are_no_control_groups_the_memory_is_the_machine_s(tmp_path):
+    assert list(installation.memory_limits(tmp_path / "nothing", tmp_path)) == []
+
+
 def test_taichi_that_crashes_and_folders_that_take_nothing(home, tmp_path, monkeypatch):
     """As a foreign build of Taichi does on an old processor: the rest of the table stands."""
     (tmp_path / "taichi").mkdir()
