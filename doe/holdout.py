@@ -233,7 +233,7 @@ def _inside(
 
 def _require(conditions: Sequence[HoldoutCondition]) -> None:
     if not conditions:
-        raise StatisticsError("holdout: no condition")
+        raise StatisticsError("holdout: no condition; at least one is needed")
     for condition in conditions:
         measured, before, after = len(condition.measured.values), len(condition.before), len(condition.after)
         if measured < 1 or min(before, after) < 2:

@@ -50,7 +50,7 @@ def stored_run(
     where the key is another one by now: a mesh file was changed meanwhile.
     """
     if pour_key(job.scene, job.seed, variant) != key:
-        raise StoreError(f"{stage}, {label}: a mesh file was changed while it was poured; begin again")
+        raise StoreError(f"{stage}, {label}: a mesh file changed during the pour; start again")
     raw = packed(record)
     return StoredRun(
         key=key,

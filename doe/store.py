@@ -161,8 +161,8 @@ class Store:
         if pouring and self.physics != PHYSICS:
             self.close()
             raise StoreError(
-                f"{path}: a store of physics {self.physics}, and this program pours by physics {PHYSICS}; it stays "
-                f"readable (explorer runs --store {path}), name another file for new pours"
+                f"{path}: a store of physics {self.physics}, but this program pours with physics {PHYSICS}; it stays "
+                f"readable (explorer runs --store {path}); name another file for new pours"
             )
 
     @contextlib.contextmanager
@@ -188,7 +188,7 @@ class Store:
             self.physics = 0
             return BEFORE_RAW_POURS
         if tables - OWN:
-            raise StoreError(f"{self.path}: is the database of another program (it has a table {min(tables - OWN)!r})")
+            raise StoreError(f"{self.path}: a database of another program (it has a table {min(tables - OWN)!r})")
         if version == 0:
             # Two processes may make it at once: one switches the journal, the other finds the file locked meanwhile.
             with contextlib.suppress(sqlite3.OperationalError):
@@ -200,7 +200,7 @@ class Store:
                 self._db.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
         said = self._db.execute("SELECT physics FROM store").fetchone()
         if said is None or not isinstance(said[0], int):
-            raise StoreError(f"{self.path}: a damaged store: it does not say of which physics it is")
+            raise StoreError(f"{self.path}: a damaged store: its version of the physics is missing")
         self.physics = said[0]
         return "pours"
 

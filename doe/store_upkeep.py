@@ -84,12 +84,12 @@ def merge(path: Path, other: Path) -> Merged:
     different bits: one of them was not poured by this solver, or is damaged.
     """
     if path.resolve() == other.resolve():
-        raise StoreError(f"{other}: is the store that it is to be merged into")
+        raise StoreError(f"{other}: is the store to merge into; name another one")
     with _opened(other) as (theirs, _), _opened(path) as (ours, db):
         if theirs.physics != ours.physics:
             raise StoreError(
-                f"{other}: a store of physics {theirs.physics}, {path} is of physics {ours.physics}; only pours of one "
-                "physics go together"
+                f"{other}: a store of physics {theirs.physics}, but {path} has physics {ours.physics}; allowed: stores "
+                "of one physics"
             )
         with _attached(db, other), db:
             both = db.execute(
@@ -99,7 +99,7 @@ def merge(path: Path, other: Path) -> Merged:
             for key, our_raw, their_raw in both:
                 if bits(our_raw) != bits(their_raw):
                     raise StoreError(
-                        f"{other}: run {key[:12]} is another pour there than in {path}; nothing was merged"
+                        f"{other}: run {key[:12]} differs from the run with the same key in {path}; nothing was merged"
                     )
             (total,) = db.execute("SELECT count(*) FROM other.pours").fetchone()
             added = db.execute("INSERT OR IGNORE INTO pours SELECT * FROM other.pours").rowcount
@@ -123,14 +123,14 @@ def prune(path: Path, study: str) -> int:
         with db:
             removed = db.execute("DELETE FROM pours WHERE study = ?", (study,)).rowcount
         db.execute("VACUUM")
+        # While others have the store open, the file gets shorter only by this.
+        db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         return removed
 
 
 def bits(raw: bytes) -> bytes:
     """A raw pour without the time that it took, which alone differs when it is poured again.
 
-        # While others have the store open, the file gets shorter only by this.
-        db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     Raises RawPourError for one that cannot be read.
     """
     return packed(dataclasses.replace(unpacked(raw), wall_s=0.0))
@@ -158,10 +158,12 @@ def _opened(path: Path, readings_do: bool = False) -> Iterator[tuple[Store, sqli
     ``readings_do``: also a store from before raw pours were kept.
     """
     if not path.is_file():
-        raise StoreError(f"{path}: there is no such store")
+        raise StoreError(f"{path}: no such store")
     with contextlib.closing(Store(path, pouring=False)) as store:
         if not store.physics and not readings_do:
-            raise StoreError(f"{path}: holds readings without raw pours; `explorer runs --csv --store {path}` lists it")
+            raise StoreError(
+                f"{path}: holds readings but no raw pours; `explorer runs --csv --store {path}` lists them"
+            )
         try:
             with contextlib.closing(sqlite3.connect(address(path, reading=True), timeout=60.0, uri=True)) as db:
                 yield store, db

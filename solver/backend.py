@@ -76,7 +76,7 @@ def init(threads: int | None = None) -> None:
             **options,
         )
     if impl.current_cfg().arch != arch:
-        raise ParameterError(f"--arch {chosen()}: this machine has no such device that Taichi can use")
+        raise ParameterError(f"--arch {chosen()}: Taichi finds no such device on this machine")
     _owner = current
 
 

@@ -38,7 +38,7 @@ def npz_arrays(source: Path | bytes, names: Sequence[str] = (), most: int = MOST
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             size = sum(member.file_size for member in archive.infolist())
         if size > most:
-            raise NpzError(f"{size} bytes unpacked; allowed: up to {most}")
+            raise NpzError(f"{size} bytes unpacked; allowed: up to {most} bytes")
         with np.load(io.BytesIO(content), allow_pickle=False) as file:
             missing = [name for name in names if name not in file]
             if missing:

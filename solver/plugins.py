@@ -49,7 +49,7 @@ class Registry(Mapping[str, T], Generic[T]):
         found = {name_of(thing): thing for thing in self._own}
         for name, entry in plugged_in(self.kind).items():
             if name in found:
-                raise PluginError(f"{described(entry)}: the name {name!r} is taken; another one is needed")
+                raise PluginError(f"{described(entry)}: the name {name!r} is taken; choose another")
             found[name] = self._loaded(name, entry)
         return found
 
@@ -60,7 +60,7 @@ class Registry(Mapping[str, T], Generic[T]):
             why = next(iter(str(error).splitlines()), "") or type(error).__name__
             raise PluginError(f"{described(entry)}: cannot be loaded: {why}") from error
         if not self._fits(thing):
-            raise PluginError(f"{described(entry)}: {entry.value} is no {self.kind.replace('_', ' ')}")
+            raise PluginError(f"{described(entry)}: {entry.value} is not of the kind {self.kind.replace('_', ' ')}")
         if getattr(thing, "name", None) != name:
             raise PluginError(f"{described(entry)}: its name is {getattr(thing, 'name', None)!r}, not {name!r}")
         return thing
@@ -108,9 +108,11 @@ def _installed() -> dict[tuple[str, str, str], EntryPoint]:
     for entry in sorted(entry_points(group=GROUP), key=lambda one: one.name):
         parts = entry.name.partition(".")
         if parts[0] not in KINDS:
-            raise PluginError(f"{described(entry)}: {parts[0]!r} is no kind; allowed: {', '.join(KINDS)}")
+            raise PluginError(f"{described(entry)}: {parts[0]!r} is not a kind of plug-in; allowed: {', '.join(KINDS)}")
         if parts in found:
-            raise PluginError(f"{described(entry)}: {_package(found[parts])} adds one of that name; remove one of both")
+            raise PluginError(
+                f"{described(entry)}: {_package(found[parts])} adds one of that name too; remove one of the two"
+            )
         found[parts] = entry
     return found
 

@@ -226,7 +226,7 @@ class Scalar(_Form):
 
     def _check(self, value: Any) -> int | float | str:
         if isinstance(value, bool) or not isinstance(value, int | float | str):
-            raise ValueError(f"{value!r}; allowed: a number or a text")
+            raise ValueError(f"{value!r}; allowed: a number or a string")
         return value
 
     def _schema(self) -> dict[str, Any]:
@@ -242,7 +242,7 @@ class Names(_Form):
             raise ValueError(f"{value!r}; allowed: a list of names")
         for name in value:
             if value.count(name) > 1:
-                raise ValueError(f"{name!r} stands twice")
+                raise ValueError(f"{name!r} appears twice")
         return tuple(value)
 
     def _schema(self) -> dict[str, Any]:

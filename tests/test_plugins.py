@@ -285,9 +285,13 @@ print(json.dumps([pour_key(scene, 1), pour_key(dragged, 1), pour_key(with_rig(sc
         ("effect.drag", "repose_plugins.stokes_drag:StokesDrag", "its name is 'stokes_drag', not 'drag'"),
         ("effect.stokes_drag", "repose_plugins.stokes_drag:Stokes", "cannot be loaded"),
         ("effect.stokes_drag", "repose_plugins.nowhere:StokesDrag", "cannot be loaded: No module named"),
-        ("effect.stokes_drag", "repose_plugins.one_at_a_time:DESIGN", "is no effect"),
+        ("effect.stokes_drag", "repose_plugins.one_at_a_time:DESIGN", "is not of the kind effect"),
         ("effect.stokes_drag", "repose_plugins.broken:StokesDrag", "cannot be loaded: division by zero"),
-        ("effects.stokes_drag", "repose_plugins.stokes_drag:StokesDrag", "'effects' is no kind; allowed: contact_law"),
+        (
+            "effects.stokes_drag",
+            "repose_plugins.stokes_drag:StokesDrag",
+            "'effects' is not a kind of plug-in; allowed: contact_law",
+        ),
     ],
 )
 def test_a_plug_in_that_cannot_be_used_is_one_line_that_names_it(tmp_path, entry, value, message):

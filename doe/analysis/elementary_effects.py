@@ -73,7 +73,7 @@ def elementary_effects(
     steps = _steps(~(np.abs(moved) <= SAME))
     single, factor = np.array([step for step in steps if step[1] < len(names)], dtype=np.int64).reshape(-1, 2).T
     if not len(single):
-        raise StatisticsError("coded: no two rows that follow one another differ in one factor alone; no Morris design")
+        raise StatisticsError("coded: no two consecutive rows differ in exactly one factor, as in a Morris design")
     change = np.diff(values)[single] / (moved[single, factor] / 2)
     known = ~np.isnan(change)
     found = [_effect(name, change[known & (factor == k)]) for k, name in enumerate(names)]

@@ -131,7 +131,7 @@ def fit_process(coded: FloatArray, responses: FloatArray, region: Region) -> Gau
         )
     scale = float(observed.std())
     if scale <= 8 * np.finfo(np.float64).eps * float(np.abs(observed).max()):
-        raise StatisticsError("responses: the same in every run; a Gaussian process has nothing to follow")
+        raise StatisticsError("responses: the same in every run; a Gaussian process needs responses that vary")
     y = (observed - observed.mean()) / scale
     bounds = np.log([LENGTHS] * k + [NOISE])
     starts = [np.log([*[length] * k, noise]) for length, noise in STARTS]

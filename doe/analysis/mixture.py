@@ -117,7 +117,7 @@ def fit_mixture(
     room = float(amounts.sum(axis=1).mean() - lows.sum())
     if room <= 0:
         raise StatisticsError(
-            f"the parts add up to {amounts.sum(axis=1).mean():g}, and their lows to {lows.sum():g}: no room"
+            f"the parts add up to {amounts.sum(axis=1).mean():g} and their lows to {lows.sum():g}: no range is left"
         )
     shares = (amounts[row] - lows) / room
     chosen = bearable_order(shares, names) if order is None else order
@@ -126,8 +126,8 @@ def fit_mixture(
     df = len(observed) - model.shape[1]
     if chosen is None or df < 1 or np.linalg.matrix_rank(model) < model.shape[1]:
         raise StatisticsError(
-            f"responses: {len(observed)} valid runs cannot bear the {len(terms)} terms of the {chosen or 'linear'} "
-            "polynomial of the mixture with an error"
+            f"responses: {len(observed)} valid runs are too few for the {len(terms)} terms of the {chosen or 'linear'} "
+            "mixture polynomial and an error"
         )
     found = least_squares(model, observed)
     # The shares add up to one: what was taken from every response goes back to the single parts.

@@ -228,9 +228,9 @@ def highest_order(
     spent = 1 if blocks is None else len(used_blocks(blocks, responses)[0])
     if not able:
         raise StatisticsError(
-            f"responses: {runs} valid runs cannot bear a linear model of {len(names)} factors with an error; "
+            f"responses: {runs} valid runs are too few for a linear model of {len(names)} factors and an error; "
             f"at least {len(names) + 2} runs at different settings are needed"
-            + ("" if blocks is None else ", and one more for every block from the second on")
+            + ("" if blocks is None else ", and one more for every block after the first")
         )
     roomy = [order for order in able if runs - spent - len(terms_of(names, order)) >= least_df]
     return (roomy or able)[-1]

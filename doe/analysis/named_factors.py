@@ -155,7 +155,7 @@ def columns_of(levels: Sequence[int], terms: Sequence[str]) -> Terms:
     known = {term_of(name) for name in every.names}
     for term in terms:
         if term not in known:
-            raise StatisticsError(f"terms: {term}: {term.removesuffix('^2')} is a factor of names, which has no square")
+            raise StatisticsError(f"terms: {term}: {term.removesuffix('^2')} has named levels and therefore no square")
     kept = [k for k, name in enumerate(every.names) if k == 0 or term_of(name) in terms]
     return Terms(every.functions[kept], tuple(every.names[k] for k in kept), every.levels)
 

@@ -212,7 +212,7 @@ def fit_random(
     likelihood = _Likelihood(runs.matrix(chosen), observed, runs.group)
     dust = 8 * np.finfo(np.float64).eps * float(np.abs(observed).max())
     if math.sqrt(max(likelihood.solved(0.0)[2], 0.0) / likelihood.df) <= dust:
-        raise StatisticsError("responses: the runs show no scatter about the terms; nothing is left to compare")
+        raise StatisticsError("responses: the terms explain the runs exactly; without scatter nothing can be tested")
     ratio = likelihood.best_ratio()
     inverse, coefficients, squares = likelihood.solved(ratio)
     within = squares / likelihood.df
@@ -261,9 +261,9 @@ def _terms(runs: _Runs, given: tuple[str, ...] | None, order: Order | None) -> t
         chosen = [orders["linear"], *able, *(one for one in able if runs.spare(one) >= LEAST_DF)][-1]
     if runs.spare(chosen) < 1:
         raise StatisticsError(
-            f"responses: {len(runs.row)} valid runs in {len(runs.names)} groups do not tell {', '.join(chosen)} from "
-            "one another and from the groups with scatter left between the groups and within; allowed: fewer terms, or "
-            "more groups"
+            f"responses: {len(runs.row)} valid runs in {len(runs.names)} groups are too few to separate "
+            f"{', '.join(chosen)} from one another and from the groups, and to estimate the scatter between and within "
+            "groups; allowed: fewer terms, or more groups"
         )
     return chosen
 

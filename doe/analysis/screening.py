@@ -281,7 +281,7 @@ def select_factors(
     known = {effect.name for effect in screening.effects if not effect.is_dummy or effect.name in exclude}
     for name in (*fallback, *exclude):
         if name not in known:
-            raise StatisticsError(f"'{name}' is no factor of the screening; allowed are {', '.join(sorted(known))}")
+            raise StatisticsError(f"'{name}' is not a factor of the screening; allowed: {', '.join(sorted(known))}")
     sizes: dict[str, tuple[float, str]] = {}
     for target, one in {"": screening, **(further or {})}.items():
         found, reason = one.significant(alpha, adjust), f"{SIGNIFICANT} in {target}" if target else SIGNIFICANT
@@ -448,17 +448,18 @@ def _require_consistent(design: npt.NDArray[np.number[Any]], names: Sequence[str
         raise StatisticsError(f"names has {len(names)} entries; allowed are {design.shape[1]} different names")
     for name in dummies:
         if name not in names:
-            raise StatisticsError(f"dummies names '{name}', which is no column of the design")
+            raise StatisticsError(f"dummies names '{name}', which is not a column of the design")
     if len(set(dummies)) == len(names):
-        raise StatisticsError("dummies names every column; at least one column must carry a factor")
+        raise StatisticsError("dummies names every column; at least one column must hold a factor")
 
 
 def _require_estimable(levels: FloatArray, valid: npt.NDArray[np.bool_]) -> None:
     """Refuse rows that cannot tell the factors apart; levels: the valid rows and factor columns."""
     model = with_intercept(levels)
     if np.linalg.matrix_rank(model) < model.shape[1]:
-        missing = ", ".join(str(row + 1) for row in np.flatnonzero(~valid)) or "none missing"
+        missing = ", ".join(str(row + 1) for row in np.flatnonzero(~valid))
+        without, repeat = (f"without rows {missing} (counted from 1) ", "repeat one, or ") if missing else ("", "")
         raise StatisticsError(
-            f"responses: without rows {missing} (counted from 1) the {model.shape[0]} others cannot separate "
-            f"{levels.shape[1]} factors and the mean; rerun one, or declare an untestable factor a dummy"
+            f"responses: {without}the {model.shape[0]} valid rows cannot separate {levels.shape[1]} factors and the "
+            f"mean; {repeat}declare an untestable factor a dummy"
         )

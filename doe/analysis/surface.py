@@ -144,7 +144,7 @@ def fit_surface(
     distinct, point_of_run = np.unique(np.column_stack([points, block]), axis=0, return_inverse=True)
     if np.linalg.matrix_rank(model) < columns:
         order = "second-order model" if terms is None else "model"
-        beside = f" beside {len(names)} blocks" if names else ""
+        beside = f" and the {len(names)} blocks" if names else ""
         raise StatisticsError(
             f"responses: the {len(distinct)} distinct points with a valid run cannot separate the "
             f"{size} terms of the {order}{beside}"
@@ -214,7 +214,7 @@ def included_terms(names: Sequence[str], terms: Sequence[str] | None) -> BoolArr
         return np.ones(len(known), dtype=np.bool_)
     for term in terms:
         if term not in known:
-            raise StatisticsError(f"terms: '{term}' is no term of the model; allowed are {', '.join(known[1:])}")
+            raise StatisticsError(f"terms: '{term}' is not a term of the model; allowed: {', '.join(known[1:])}")
     return np.array([k == 0 or term in terms for k, term in enumerate(known)])
 
 

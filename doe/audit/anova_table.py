@@ -152,7 +152,9 @@ def require_degrees(lines: Sequence[Line], terms: Sequence[str], factors: tuple[
             )
     settled = any(line.role in ("model", "residual") and line.df is not None for line in lines)
     if not settled and len(terms) + 1 < len(term_names(factors)):
-        raise StatisticsError("no degrees of freedom say whether the model has more terms than the table names")
+        raise StatisticsError(
+            "the table lacks the degrees of freedom that tell whether the model has more terms than it names"
+        )
 
 
 def consistency(lines: Sequence[Line]) -> tuple[dict[Cell, Judged], Role]:

@@ -89,7 +89,7 @@ def printed(text: str) -> Printed:
         kind = ">" if bound == ">" else ""
     value = float(f"{digits}e{exponent or 0}")
     if not (value == 0 or SMALLEST <= abs(value) <= LARGEST):
-        raise AuditError(f"{text!r} is out of range; allowed are sizes from {SMALLEST:g} to {LARGEST:g}, and 0")
+        raise AuditError(f"{text!r} is out of range; allowed: 0, and absolute values from {SMALLEST:g} to {LARGEST:g}")
     return Printed(plain, value, half * scale, kind)
 
 

@@ -148,7 +148,7 @@ def evaluated(formula: str, numbers: Mapping[str, float]) -> float:
 
 def _parsed(formula: str) -> ast.Expression:
     if len(formula) > LONGEST:
-        raise AuditError(f"formula of {len(formula)} characters; allowed are up to {LONGEST}")
+        raise AuditError(f"formula of {len(formula)} characters; allowed: up to {LONGEST}")
     try:
         return ast.parse(formula.strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError):

@@ -80,7 +80,7 @@ def implied_mse(sums: Sequence[Printed], f: Sequence[Printed]) -> tuple[float, f
     middle = float(np.median(values_of(sums) / np.maximum(values_of(f), 1e-300)))
     low, high, _ = most_agreed(intervals, middle)
     if not np.isfinite(high) or high <= 0:
-        raise StatisticsError("F is too small in every line to say what the error mean square was")
+        raise StatisticsError("F is too small in every line to derive the error mean square")
     return low, high
 
 

@@ -38,14 +38,17 @@ def with_given(measurement: Measurement, given: Given) -> Measurement:
     for effect, amplitude in given.items():
         scenes = [one.scene for one in measurement.conditions]
         if math.hypot(*amplitude) < LEAST * EFFECTS[effect].strongest:
-            raise MeasurementError(f"{effect}: an amplitude of {math.hypot(*amplitude):.3g} is none that can be given")
+            least = LEAST * EFFECTS[effect].strongest
+            raise MeasurementError(
+                f"{effect}: an amplitude of {math.hypot(*amplitude):.3g} is too small; allowed: at least {least:.3g}"
+            )
         known = {parameter.path for parameter in measurement.parameters}
         bounds = widest(effect, scenes)
         centre = _within(_rounded(effect, amplitude), bounds)
         ranges = _ranges(measurement.scene, effect, centre, bounds)
         for one in ranges:
             if one.path in known:
-                raise MeasurementError(f"{measurement.folder}: {one.path} is one of its parameters already")
+                raise MeasurementError(f"{measurement.folder}: {one.path} is already one of its parameters")
         measurement = replace(
             measurement,
             scene=with_values(measurement.scene, dict(effect_values(effect, centre))),

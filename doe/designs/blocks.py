@@ -37,9 +37,9 @@ def block_generators(columns: Sequence[int], blocks: int, clear: int = 1) -> tup
     if found is not None:
         return found
     possible = [str(number) for number in possible_blocks(columns, clear)]
-    what = "main effects" if clear == 1 else "main effects and interactions of two"
+    what = "main effects" if clear == 1 else "main effects and two-factor interactions"
     raise StatisticsError(
-        f"blocks = {blocks}: cannot be told from {what} in {2**basic} runs of {len(columns)} factors; "
+        f"blocks = {blocks}: would be aliased with {what} in {2**basic} runs of {len(columns)} factors; "
         f"allowed: {', '.join(possible) or 'no blocks'}"
     )
 

@@ -61,8 +61,8 @@ def block_of_edges(factors: int, blocks: int) -> npt.NDArray[np.int64]:
     Raises StatisticsError, with the number that there is, for another number of blocks than that of the factors.
     """
     if blocks != BLOCKS.get(factors):
-        allowed = f"allowed: {BLOCKS[factors]}" if factors in BLOCKS else "there are none that are orthogonal"
-        raise StatisticsError(f"blocks = {blocks}: of a Box–Behnken design of {factors} factors; {allowed}")
+        allowed = BLOCKS.get(factors, "none, as no number of blocks is orthogonal")
+        raise StatisticsError(f"blocks = {blocks}; allowed: {allowed} for a Box–Behnken design of {factors} factors")
     if factors in BLOCK_OF_PAIR:
         return np.repeat(BLOCK_OF_PAIR[factors], 4)
     signs = [np.prod(levels) for _ in TRIPLES[factors] for levels in product((-1, 1), repeat=3)]

@@ -60,7 +60,9 @@ def central_composite_blocks(
     if factors not in FACTORS:
         raise StatisticsError(f"factors = {factors}: central composite designs are made for 2 to 7 factors")
     if alpha not in ("rotatable", "inscribed"):
-        raise StatisticsError(f"alpha = {alpha!r}: is given by the blocks; allowed: rotatable (near it) or inscribed")
+        raise StatisticsError(
+            f"alpha = {alpha!r}: the blocks set the axial distance; allowed: rotatable (nearly) or inscribed"
+        )
     generators, parts = _generators(factors), blocks - 1
     try:
         corners = factorial(factors, generators).astype(np.float64)
@@ -68,8 +70,8 @@ def central_composite_blocks(
     except StatisticsError:
         allowed = ", ".join(str(one + 1) for one in (1, *possible_blocks(factor_columns(factors, generators), 2)))
         raise StatisticsError(
-            f"blocks = {blocks}: of a central composite design of {factors} factors; allowed: {allowed} "
-            "(the last one is of the axial points)"
+            f"blocks = {blocks}; allowed for a central composite design of {factors} factors: {allowed} "
+            "(the last block holds the axial points)"
         ) from None
     in_cube, in_axial = CENTRE_IN_BLOCKS[factors] if centre is None else (centre * parts, centre)
     if in_cube + in_axial < 1:

@@ -76,20 +76,20 @@ def generator_words(factors: int, generators: Sequence[str]) -> list[tuple[int, 
     for text in generators:
         match = GENERATOR.match(text.upper())
         if match is None:
-            raise StatisticsError(f"generator {text!r}: allowed is a form such as E=ABC or E=-ABC")
+            raise StatisticsError(f"generator {text!r}; allowed: the form E=ABC or E=-ABC")
         left, sign, right = match.groups()
         unknown = [letter for letter in left + right if letter not in letters]
         if unknown:
             raise StatisticsError(f"generator {text!r}: no factor {unknown[0]}; allowed are {', '.join(letters)}")
         if left in right or len(set(right)) < max(2, len(right)):
-            raise StatisticsError(f"generator {text!r}: the right side must be two or more different other factors")
+            raise StatisticsError(f"generator {text!r}: the right side must name two or more other factors, each once")
         indices = frozenset(letters.index(letter) for letter in left + right)
         found.append((letters.index(left), Word(-1 if sign in {"-", "−"} else 1, indices)))
     made = [factor for factor, _ in found]
     for factor, word in found:
         if made.count(factor) > 1 or (word.factors - {factor}) & set(made):
             raise StatisticsError(
-                f"generator of {letters[factor]}: every generator must set another factor, from factors that none sets"
+                f"generator of {letters[factor]}: each generator must set another factor, from factors that none sets"
             )
     return found
 
@@ -144,7 +144,7 @@ def standard_generators(factors: int, removed: int) -> tuple[str, ...]:
         listed = sorted({removed for k, removed in STANDARD_FRACTIONS if k == factors} | {1})
         have = ", ".join(f"{factors}-{p} ({2 ** (factors - p)} runs)" for p in listed if factors - p <= MOST_BASIC)
         raise StatisticsError(
-            f"no listed fraction 2^({factors}-{removed}); listed: {have or 'none'}; others by generators such as E=ABC"
+            f"no listed fraction 2^({factors}-{removed}); listed: {have or 'none'}; others: generators such as E=ABC"
         ) from None
 
 
@@ -239,7 +239,7 @@ class Factorial(Design):
         """In standard order; centre runs only where they are asked for, with blocks as many in each."""
         asked = [name for name in ("generators", "fraction", "runs") if getattr(options, name)]
         if len(asked) > 1:
-            raise StatisticsError(f"{asked[1]}: has generators of its own; allowed: {asked[1]} or {asked[0]}")
+            raise StatisticsError(f"{asked[1]}: given together with {asked[0]}; allowed: one of the two")
         removed = options.fraction if options.runs is None else _removed(factors, options.runs)
         generators = options.generators or (standard_generators(factors, removed) if removed else ())
         name = f"2^({factors}−{len(generators)})" if generators else f"2^{factors}"
@@ -267,7 +267,7 @@ def _removed(factors: int, runs: int) -> int:
         sizes.append(2 ** (factors - 1))
     sizes += [2 ** (k - removed) for k, removed in STANDARD_FRACTIONS if k == factors]
     if runs not in sizes:
-        allowed = ", ".join(map(str, sorted(set(sizes)))) or "none, but by generators such as E=ABC"
+        allowed = ", ".join(map(str, sorted(set(sizes)))) or "none, except by generators such as E=ABC"
         raise StatisticsError(f"runs = {runs}: no listed factorial of {factors} factors; allowed: {allowed}")
     return factors - (runs.bit_length() - 1)
 

@@ -25,7 +25,9 @@ def simplex_lattice(parts: int, degree: int) -> FloatArray:
     Raises StatisticsError for fewer than two parts, a degree below 1, or more than 20 000 blends.
     """
     if parts < 2 or degree < 1:
-        raise StatisticsError(f"lattice = {degree} of {parts} parts; allowed: at least 1, of at least two parts")
+        raise StatisticsError(
+            f"lattice = {degree} of {parts} parts; allowed: a degree of at least 1 and at least 2 parts"
+        )
     number = math.comb(parts + degree - 1, degree)
     if number > MOST_BLENDS:
         raise StatisticsError(f"lattice = {degree}: {number} blends of {parts} parts; allowed: up to {MOST_BLENDS}")
@@ -41,7 +43,7 @@ def simplex_centroid(parts: int) -> FloatArray:
     Raises StatisticsError outside 2..10 parts.
     """
     if not 2 <= parts <= 10:
-        raise StatisticsError(f"{parts} parts: a simplex centroid has 2 to 10")
+        raise StatisticsError(f"{parts} parts; allowed in a simplex centroid: 2 to 10")
     blends = [chosen for size in range(1, parts + 1) for chosen in combinations(range(parts), size)]
     return np.array([[float(k in chosen) / len(chosen) for k in range(parts)] for chosen in blends])
 

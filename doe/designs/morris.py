@@ -28,7 +28,9 @@ def morris(factors: int, trajectories: int, seed: int) -> FloatArray:
     Raises StatisticsError for fewer than one factor or two trajectories.
     """
     if factors < 1 or trajectories < 2:
-        raise StatisticsError(f"{factors} factors, {trajectories} trajectories; allowed: at least 1 and 2")
+        raise StatisticsError(
+            f"{factors} factors, {trajectories} trajectories; allowed: at least 1 factor and 2 trajectories"
+        )
     random = np.random.default_rng(seed)
     drawn = np.array([_trajectory(factors, random) for _ in range(DRAWN * trajectories)])
     kept = [0]
@@ -71,7 +73,7 @@ class Morris(Design):
         if rest or trajectories < 2:
             least = max(trajectories, 2) * (factors + 1)
             raise StatisticsError(
-                f"runs = {runs}: trajectories of {factors} factors have {factors + 1} runs; allowed: {least}, "
+                f"runs = {runs}: each trajectory of {factors} factors has {factors + 1} runs; allowed: {least}, "
                 f"{least + factors + 1}, …"
             )
         return Points(morris(factors, trajectories, options.seed), traits=(f"{trajectories} trajectories",))

@@ -103,7 +103,8 @@ class Region:
         within = drawn[self.allowed(drawn)]
         if len(within) < FEWEST_IN_REGION:
             raise StatisticsError(
-                f"constraints: leave {len(within)} of {REGION_POINTS} points of low … high; allowed: a wider region"
+                f"constraints: only {len(within)} of {REGION_POINTS} random points between low and high satisfy them; "
+                f"allowed: at least {FEWEST_IN_REGION}"
             )
         return within
 
@@ -301,7 +302,7 @@ class OptimalDesign(Design):
         p, rank = len(terms.names), int(np.linalg.matrix_rank(terms.matrix(kept))) if len(kept) else 0
         runs = max(p + SPARE_RUNS - len(kept), p - rank, 1) if options.runs is None else options.runs
         if runs < p - rank:
-            beside = f" beside {len(kept)} finished runs, which tell {rank} of them apart" if len(kept) else ""
+            beside = f" beside {len(kept)} finished runs, which determine {rank} of them" if len(kept) else ""
             raise StatisticsError(
                 f"runs = {runs}: too few for the {p} terms of the {options.model} model{beside}; "
                 f"allowed: at least {p - rank}"
@@ -312,7 +313,7 @@ class OptimalDesign(Design):
         told = terms.estimable(design)
         if not told.all():
             lost = ", ".join(name for name, known in zip(terms.names, told, strict=True) if not known)
-            raise StatisticsError(f"model {options.model}: no runs within the constraints tell {lost} apart")
+            raise StatisticsError(f"model {options.model}: no runs within the constraints can separate {lost}")
         found = efficiency(terms, region, design, grid)
         notes = [
             f"D-efficiency {found.d:.1f} %, A-efficiency {found.a:.1f} %, G-efficiency {found.g:.1f} % (100 %: "

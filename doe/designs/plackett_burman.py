@@ -105,7 +105,7 @@ def smallest_size(factors: int) -> int:
     Raises StatisticsError outside 1..47 factors.
     """
     if not 1 <= factors < SIZES[-1]:
-        raise StatisticsError(f"{factors} factors: Plackett–Burman designs here take 1 to {SIZES[-1] - 1}")
+        raise StatisticsError(f"{factors} factors; allowed in a Plackett–Burman design: 1 to {SIZES[-1] - 1}")
     return next(size for size in SIZES if size > factors)
 
 
@@ -189,7 +189,7 @@ class PlackettBurman(Design):
         table = nonregular_table(size) if options.nonregular else plackett_burman(size)
         most = MOST_NONREGULAR[size] if options.nonregular else size - 1
         if factors > most:
-            raise StatisticsError(f"runs {size}: has {most} columns for {factors} factors; allowed: at least {least}")
+            raise StatisticsError(f"runs = {size}: has {most} columns for {factors} factors; allowed: at least {least}")
         levels = fold_over(table) if options.fold else table
         rows = with_centre(levels, options.centre)
         traits = [f"{size} runs, {size - 1 - factors} columns without a factor"]

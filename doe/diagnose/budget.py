@@ -31,8 +31,8 @@ class Budget:
         least = LEAST.planned(directions, conditions)
         if runs < least:
             raise StatisticsError(
-                f"budget: {runs} pours; {directions} directions of effects in {conditions} fitted conditions take at "
-                f"least {least}"
+                f"budget: {runs} pours; allowed: at least {least} for {directions} directions of effects in "
+                f"{conditions} fitted conditions"
             )
         share = runs / self.planned(directions, conditions)
         # What is held at its least is taken from the rest.

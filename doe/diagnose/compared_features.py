@@ -144,7 +144,7 @@ def weighed(
     ]
     for condition, chosen in zip(conditions, columns, strict=True):
         if chosen.size == 0 or len(condition.pours(chosen)) == 0:
-            raise StatisticsError(f"{condition.condition}: no number of the data varies in the pours and can be read")
+            raise StatisticsError(f"{condition.condition}: no measured number varies in the pours and can be read")
     blocks = tuple(condition.pours(chosen) for condition, chosen in zip(conditions, columns, strict=True))
     numbers = np.array([len(b) * one.mean_of for b, one in zip(blocks, conditions, strict=True)], dtype=np.float64)
     weights = numbers / numbers.mean()

@@ -145,12 +145,12 @@ def joined(measurement: Measurement, follow_up: Measurement) -> Measurement:
     Raises MeasurementError where the follow-up has other parameters, or a condition of a name that is there already.
     """
     if follow_up.parameters != measurement.parameters:
-        raise MeasurementError(f"{follow_up.folder}: parameters are not those of {measurement.folder}")
+        raise MeasurementError(f"{follow_up.folder}: its [parameters] differ from those of {measurement.folder}")
     known = {condition.name for condition in measurement.conditions}
     for condition in follow_up.fit:
         if condition.name in known:
             raise MeasurementError(
-                f"{follow_up.folder}: condition {condition.name!r} is one of {measurement.folder} already"
+                f"{follow_up.folder}: condition {condition.name!r} is already in {measurement.folder}"
             )
     return replace(measurement, conditions=(*measurement.fit, *follow_up.fit, *measurement.holdout))
 
@@ -171,7 +171,7 @@ def pursued(training: TrainingPours, conditions: Sequence[Condition], budget: Bu
             if settled:
                 break
             if name in looked and (rival := inseparable(compared, name)):
-                say(f"no pours tell {name} from {rival}: what is between them is within the noise of the data")
+                say(f"no pours can tell {name} from {rival}: they differ by less than the noise of the data")
                 break
         poured = training.look(found)
         if not poured:

@@ -297,7 +297,7 @@ def emulated(
     names = ["base", *(way.name for way in ways)]
     for number, name in enumerate(names, start=-1):
         if (count := int((lessons.way == number).sum())) < 2:
-            raise StatisticsError(f"{name}: {count} pours that count in every condition; allowed: at least 2")
+            raise StatisticsError(f"{name}: {count} pours valid in every condition; allowed: at least 2")
     k, m = lessons.theta.shape[1], len(ways)
     base, own = lessons.way == -1, lessons.where(lessons.own)
     squashes = tuple(_squash(own, c) for c in range(len(lessons.blocks)))

@@ -107,7 +107,7 @@ class TrainingPours:
             outcomes = sorted({pour.outcome for row in self._base for pour in row if not pour.valid})
             raise StatisticsError(
                 f"base model: {valid} of {len(base)} pours end in a valid pile (the others: {', '.join(outcomes)}); "
-                "the declared model does not do what was measured"
+                "the declared model does not reproduce the experiment"
             )
         say(f"base model: {len(base)} settings")
         self._levels = self._found_levels()

@@ -107,7 +107,7 @@ def analyse_elastic(shear: Path, compression: Path) -> LabResult:
     by_shear, by_compression = analyse("shear", shear), analyse("compression", compression)
     ratios = poisson_ratios(by_compression.derived, by_shear.derived)
     if not ratios:
-        raise LaboratoryError(f"{shear} and {compression}: no component stands in both")
+        raise LaboratoryError(f"{shear} and {compression}: no component is in both; allowed: at least one")
     return LabResult(
         test="shear",
         file=by_shear.file,

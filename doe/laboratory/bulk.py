@@ -232,14 +232,18 @@ def _check_vessel(table: Table, row: Reading) -> None:
     if loose_density(row) <= 0.0:
         raise table.wrong(row, "mass_vessel", "leaves no sample; allowed: below mass")
     if "mass_tapped" in row.values and "volume_tapped" in row.values:
-        raise table.wrong(row, "mass_tapped", "stands beside volume_tapped; allowed: one of them")
+        raise table.wrong(row, "mass_tapped", "given together with volume_tapped; allowed: one of them")
     tapped = tapped_density(row)
     if tapped < loose_density(row):
         column = "mass_tapped" if "mass_tapped" in row.values else "volume_tapped"
-        raise table.wrong(row, column, "is looser than before tapping; allowed: as dense or denser")
+        raise table.wrong(
+            row, column, "gives a lower density than before tapping; allowed: the same or a higher density"
+        )
     packed = max(loose_density(row), 0.0 if math.isnan(tapped) else tapped)
     if row.values.get("particle_density", math.inf) <= packed:
-        raise table.wrong(row, "particle_density", f"leaves no voids; allowed: above {packed:.4g} kg/m3, the bulk's")
+        raise table.wrong(
+            row, "particle_density", f"leaves no voids; allowed: above {packed:.4g} kg/m3, the bulk density"
+        )
 
 
 def _check_drum(table: Table, row: Reading) -> None:
@@ -248,13 +252,13 @@ def _check_drum(table: Table, row: Reading) -> None:
         raise table.wrong(row, "lower_angle", "is above the upper_angle; allowed: up to it")
     if ("speed" in row.values) != ("diameter" in row.values):
         missing = "diameter" if "speed" in row.values else "speed"
-        raise table.wrong(row, missing, "is empty; allowed: speed and diameter, or neither")
+        raise table.wrong(row, missing, "is empty; allowed: both speed and diameter, or neither")
 
 
 def _check_box(table: Table, row: Reading) -> None:
     """Something was read, and a mass that stays or a time comes with the mass that flowed out."""
     if not row.values:
-        raise table.wrong(row, "shear_angle", "is empty, as is all of the row; allowed: at least one reading")
+        raise table.wrong(row, "shear_angle", "is empty, like the whole row; allowed: at least one reading in a row")
     for column in ("mass_left", "flow_time"):
         if column in row.values and "mass_discharged" not in row.values:
-            raise table.wrong(row, "mass_discharged", f"is empty; allowed: with {column}, the mass that flowed out")
+            raise table.wrong(row, "mass_discharged", f"is empty; needed with {column}: the mass that flowed out")

@@ -241,7 +241,7 @@ def _check_one_way(table: Table, row: Reading, direct: str, both: tuple[str, str
     allowed = f"allowed: {direct}, or {both[0]} and {both[1]}"
     given = [name for name in both if name in row.values]
     if direct in row.values and given:
-        raise table.wrong(row, direct, f"stands beside {given[0]}; {allowed}")
+        raise table.wrong(row, direct, f"given together with {given[0]}; {allowed}")
     if direct not in row.values and len(given) < 2:
         missing = next(name for name in both if name not in given)
         raise table.wrong(row, missing, f"is empty; {allowed}")
@@ -251,7 +251,7 @@ def _check(table: Table, row: Reading) -> None:
     """One of the two measurements must be there, a rebound be slower than the fall, and e lie in 0 … 1."""
     speeds = [name for name in ("v_x", "v_z") if name in row.values]
     if len(speeds) == 1:
-        raise table.wrong(row, speeds[0], "stands alone; allowed: both of v_x_m_s and v_z_m_s, or none")
+        raise table.wrong(row, speeds[0], "given alone; allowed: both v_x_m_s and v_z_m_s, or neither")
     if not speeds and "distance" not in row.values:
         raise table.wrong(row, "distance_mm", "is missing; allowed: distance_mm, or v_x_m_s and v_z_m_s, or all three")
     fall = math.sqrt(2.0 * GRAVITY * row.values["drop_height"])

@@ -97,9 +97,7 @@ def _check(table: Table, rows: tuple[Reading, ...]) -> None:
     for row in rows:
         for name in COLUMNS[1:]:
             if row.values.get(name, 0.0) > row.values["length"]:
-                raise table.wrong(row, name, "is above the length; allowed: the length is a piece's longest dimension")
+                raise table.wrong(row, name, "is above the length; allowed: up to the length, the longest dimension")
         if ("thickness" in row.values) != ("thickness" in rows[0].values):
-            allowed = f"allowed: all pieces of {row.of[0]} have one (row {rows[0].line}), or none"
-            raise table.wrong(
-                row, "thickness", f"{'stands alone' if 'thickness' in row.values else 'is empty'}; {allowed}"
-            )
+            allowed = f"allowed: a thickness for all pieces of {row.of[0]} or for none (see row {rows[0].line})"
+            raise table.wrong(row, "thickness", f"{'is given' if 'thickness' in row.values else 'is empty'}; {allowed}")

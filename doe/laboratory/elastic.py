@@ -73,7 +73,7 @@ def _check(table: Table, points: list[Reading], head: Reading) -> None:
                 raise table.wrong(row, column, f"differs from row {first.line} of the same replicate")
     curved = "radius" in first.values
     if curved != ("radius" in head.values):
-        raise table.wrong(first, "radius", f"allowed: in every replicate of {first.of[0]}, or in none")
+        raise table.wrong(first, "radius", f"allowed: a radius in every replicate of {first.of[0]}, or in none")
     for column in ("poisson_ratio", "contacts") if curved else ("thickness", "area"):
         if column not in first.values:
             raise table.wrong(
@@ -81,7 +81,7 @@ def _check(table: Table, points: list[Reading], head: Reading) -> None:
                 "poisson_ratio and contacts of a curved one"
             )  # fmt: skip
     if curved and first.values["contacts"] not in (1.0, 2.0):
-        raise table.wrong(first, "contacts", f"{first.values['contacts']:g}; allowed: 1, 2 (between two plates)")
+        raise table.wrong(first, "contacts", f"{first.values['contacts']:g}; allowed: 1, or 2 (between two plates)")
     if 1 < len(points) < FEWEST_POINTS:
         raise table.wrong(
             first,
@@ -130,7 +130,9 @@ def _curved(table: Table, points: list[Reading], body: CurvedBody) -> tuple[floa
 def _check_single(table: Table, row: Reading) -> None:
     for column in ("displacement", "force"):
         if row.values[column] <= 0.0:
-            raise table.wrong(row, column, "not above zero; a single reading needs a force and a displacement")
+            raise table.wrong(
+                row, column, "is not above zero; allowed in a single reading: force and displacement above zero"
+            )
 
 
 def _no_curve(table: Table, first: Reading, why: str) -> LaboratoryError:

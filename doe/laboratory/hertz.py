@@ -157,7 +157,7 @@ def hertz_range(displacement: npt.ArrayLike, force: npt.ArrayLike) -> HertzRange
         v, h = (v[used], h[used]) if used.sum() >= FEWEST_POINTS else (u[:end], g[:end])
     law = _fitted(v, h)
     if not (law.stiffness > 0.0 and law.origin < v[-1] and h[-1] > 0.0):
-        raise StatisticsError("no contact: the force does not rise from zero on")
+        raise StatisticsError("no contact: the force does not rise from zero")
     free = _fitted(v, h, law)
     half = float(stats.t.ppf(0.975, v.size - 3)) * free.exponent_error
     scale = peak / length**HERTZ

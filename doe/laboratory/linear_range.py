@@ -96,7 +96,7 @@ def linear_range(displacement: npt.ArrayLike, force: npt.ArrayLike) -> LinearRan
 def way_up(displacement: Array, force: Array) -> tuple[Array, Array]:
     """The points up to the largest force whose displacement exceeds all before."""
     if displacement.shape != force.shape or displacement.ndim != 1:
-        raise StatisticsError(f"{displacement.size} displacements for {force.size} forces; allowed: as many")
+        raise StatisticsError(f"{displacement.size} displacements for {force.size} forces; allowed: equal numbers")
     end = int(force.argmax()) + 1 if force.size else 0
     x, f = displacement[:end], force[:end]
     before = np.concatenate([[-math.inf], np.maximum.accumulate(x)[:-1]])

@@ -190,14 +190,16 @@ def _check(table: Table, sample: list[Reading]) -> None:
         opening = row.values["aperture"]
         if opening in openings:
             raise table.wrong(
-                row, "aperture", f"stands in row {openings[opening]} of the replicate too; allowed: every sieve once"
+                row, "aperture", f"is also in row {openings[opening]} of the replicate; allowed: each sieve once"
             )
         openings[opening] = row.line
     where = f"replicate {first.replicate} of {first.of[0]}"
     if 0.0 not in openings:
-        raise table.wrong(first, "aperture", f"{where} has no pan; allowed: a row with 0, also where nothing fell in")
+        raise table.wrong(
+            first, "aperture", f"{where} has no pan; needed: a row with aperture 0, even if nothing fell into the pan"
+        )
     if len(openings) < 3:
-        raise table.wrong(first, "aperture", f"{where} has {len(openings) - 1} sieve; allowed: two and a pan, or more")
+        raise table.wrong(first, "aperture", f"{where} has {len(openings) - 1} sieve; allowed: at least two, and a pan")
     if not any(row.values["mass_retained"] > 0.0 for row in sample):
         raise table.wrong(first, "mass_retained", f"{where} weighs nothing; allowed: a sample with a mass")
     totals = {row.values["mass_total"]: row for row in sample if "mass_total" in row.values}

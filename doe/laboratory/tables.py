@@ -356,7 +356,7 @@ def _columns(where: str, header: list[str], layout: Layout) -> dict[str, Column]
     """Columns of numbers by their name in the file."""
     twice = next((name for name in header if header.count(name) > 1), None)
     if twice is not None:
-        raise LaboratoryError(f"{where}, column {twice}: stands twice; allowed: once")
+        raise LaboratoryError(f"{where}, column {twice}: appears twice; allowed: once")
     found: dict[str, Column] = {}
     for name in header:
         if name in (*layout.keys, REPLICATE, NOTE):
@@ -365,7 +365,7 @@ def _columns(where: str, header: list[str], layout: Layout) -> dict[str, Column]
         if column is None:
             raise LaboratoryError(f"{where}, column {name!r}: {_why_unknown(name, layout)}")
         if any(other.stem == column.stem for other in found.values()):
-            raise LaboratoryError(f"{where}, column {name}: {column.stem} stands twice; allowed: in one unit")
+            raise LaboratoryError(f"{where}, column {name}: {column.stem} appears in two units; allowed: one")
         found[name] = column
     for key in (*layout.keys, REPLICATE):
         if key not in header:
@@ -419,7 +419,9 @@ def _check_errors(
         half = values.get(f"{column.stem}{ERROR}", 0.0)
         if not column.zero and half >= values.get(column.stem, math.inf) - column.low:
             name = beside[f"{column.stem}{ERROR}"]
-            raise LaboratoryError(f"{where}, column {name}: {cells[name]!r}; allowed: below the reading beside it")
+            raise LaboratoryError(
+                f"{where}, column {name}: {cells[name]!r}; allowed: an error that keeps the reading within its range"
+            )
 
 
 def _value(where: str, name: str, text: str, column: Column, number: Callable[[str], float]) -> float:
@@ -435,6 +437,8 @@ def _check_single(table: Table) -> None:
         for row in rows:
             if row.replicate in seen:
                 raise table.wrong(
-                    row, REPLICATE, f"{row.replicate!r} of {'-'.join(row.of)} stands in row {seen[row.replicate]} too"
+                    row,
+                    REPLICATE,
+                    f"{row.replicate!r} of {'-'.join(row.of)} is also in row {seen[row.replicate]}; allowed: once",
                 )
             seen[row.replicate] = row.line

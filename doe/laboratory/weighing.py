@@ -24,7 +24,7 @@ def moisture(table: Table) -> tuple[Derived, ...]:
     """Moisture of every component as a fraction, wet and dry basis."""
     for row in table.rows:
         if row.values["mass_after"] > row.values["mass_before"]:
-            raise table.wrong(row, "mass_after", "is above mass_before; allowed: what is left after drying")
+            raise table.wrong(row, "mass_after", "is above mass_before; allowed: up to mass_before")
         if _container(row) >= row.values["mass_after"]:
             raise table.wrong(row, "mass_container", "leaves no dry mass; allowed: below mass_after")
     wet = per_row(table, "moisture_wet_basis", "1", "(m − m_dry)/m", _wet, no_parameter)
@@ -56,7 +56,8 @@ def composition(table: Table, left_out: Collection[str] = ()) -> tuple[Derived, 
         for sample in samples:
             if sample not in rows:
                 raise LaboratoryError(
-                    f"{table.file}: component {name} is missing in replicate {sample}; allowed: all of them, 0 for none"
+                    f"{table.file}: component {name} is missing in replicate {sample}; allowed: every component, with "
+                    "mass 0 if absent"
                 )
     totals = {sample: sum(rows[sample].values["mass"] for rows in kept.values()) for sample in samples}
     for sample, total in totals.items():

@@ -116,7 +116,7 @@ def condition_scene(base: Scene, entry: ConditionTable, measured: Sequence[Measu
     for parameter in measured:
         if parameter.path in own:
             raise MeasurementError(
-                f"rig_parameters.{parameter.path.removeprefix('rig.')}: stands in [parameters] too; allowed: in one"
+                f"rig_parameters.{parameter.path.removeprefix('rig.')}: is in [parameters] too; allowed: in one of them"
             )
         if parameter.path in known:
             settings[parameter.path] = _start(parameter, float(value(bare, parameter.path)))
@@ -158,7 +158,7 @@ def _duration(entry: ConditionTable, scene: Scene) -> dict[str, Any]:
     """``duration`` stands with the insertion or in the condition itself; a run may take at least as long."""
     stated = [duration for duration in (entry.duration, entry.insertion.duration) if duration is not None]
     if len(stated) > 1:
-        raise MeasurementError("duration: stands in the condition and in its insertion; allowed: once")
+        raise MeasurementError("duration: given in the condition and in its insertion; allowed: in one of the two")
     if not stated:
         return {}
     most = max(float(value(scene, "numerics.max_time")), stated[0])
@@ -171,5 +171,6 @@ def _check_feed(scene: Scene, insertion: FeedTable) -> None:
     floor, low = pour_rig(scene).feed().floor, insertion.region_z[0]
     if abs(low - floor) > FEED_SLACK:
         raise MeasurementError(
-            f"insertion.region_z: begins at {low:g} m; allowed: {floor:g} m, the feed opening of the {scene.rig.name}"
+            f"insertion.region_z: begins at {low:g} m; allowed: {floor:g} m, the height of the feed opening of the "
+            f"{scene.rig.name}"
         )

@@ -183,9 +183,11 @@ def _condition_entries(tables: Sequence[Settings]) -> list[ConditionTable]:
         with _within(table.get("name")):
             given.append(checked(ConditionTable, table))
         if given[-1].name in (entry.name for entry in given[:-1]):
-            raise MeasurementError(f"condition.name: {given[-1].name!r} stands twice; allowed: each name once")
+            raise MeasurementError(f"condition.name: {given[-1].name!r} appears twice; allowed: each name once")
     if not any(entry.role == "fit" for entry in given):
-        raise MeasurementError(f"condition.role: none of {len(given)} conditions is fit; allowed: at least one fit")
+        raise MeasurementError(
+            f"condition.role: none of {len(given)} conditions has the role fit; at least one is needed"
+        )
     return given
 
 

@@ -63,7 +63,9 @@ def read_long_form(path: Path) -> LongForm:
     replicates = len(numbers)
     missing = next((k for k, number in enumerate(numbers, start=1) if number != k), None)
     if missing is not None:
-        raise MeasurementError(f"{path}: replicate: {missing} is missing of {numbers[-1]}; allowed: numbers from 1 on")
+        raise MeasurementError(
+            f"{path}: replicate: {missing} of {numbers[-1]} is missing; allowed: numbered from 1 without gaps"
+        )
     by_name: dict[str, list[LongRow]] = {}
     for row in rows:
         by_name.setdefault(row.observable, []).append(row)
@@ -79,7 +81,7 @@ def _rows(path: Path) -> Iterator[LongRow | str]:
     (line, header), *rows = table.rows
     if header not in (COLUMNS, [*COLUMNS, "unit"]):
         raise MeasurementError(
-            f"{path}:{line}: columns {','.join(header)}; allowed: {','.join(COLUMNS)}, and unit after them"
+            f"{path}:{line}: columns {','.join(header)}; allowed: {','.join(COLUMNS)}, and then optionally unit"
         )
     check_cells(table, lambda line, what: MeasurementError(f"{path}:{line}: {what}"))
     for line, cells in rows:
@@ -95,7 +97,11 @@ def _row(where: str, line: int, cells: dict[str, str], number: Callable[[str], f
     if not cells["replicate"].isdecimal() or int(cells["replicate"]) < 1:
         raise MeasurementError(f"{where}: replicate: {cells['replicate']!r}; allowed: whole numbers from 1 on")
     if (known.x_unit is None) != (cells["x"] == ""):
-        kind = "an empty x (it is a scalar)" if known.x_unit is None else f"a place x in {known.x_unit} (it is a curve)"
+        kind = (
+            "an empty x (it is a scalar)"
+            if known.x_unit is None
+            else f"a coordinate x in {known.x_unit} (it is a curve)"
+        )
         raise MeasurementError(f"{where}: {name}: x is {cells['x']!r}; allowed: {kind}")
     x = None if known.x_unit is None else _finite(where, "x", cells["x"], known.x_unit, number)
     return LongRow(line, int(cells["replicate"]), name, x, _value(where, cells, known.unit, number))
@@ -138,6 +144,6 @@ def _array(path: Path, rows: list[LongRow], replicates: int) -> tuple[Array | No
     for row in rows:
         place = row.replicate - 1, 0 if row.x is None else column[row.x]
         if not np.isnan(values[place]):
-            raise MeasurementError(f"{path}:{row.line}: {row.observable}: this value stands twice; allowed: once")
+            raise MeasurementError(f"{path}:{row.line}: {row.observable}: this value appears twice; allowed: once")
         values[place] = row.value
     return (np.array(places), values) if places else (None, values[:, 0])

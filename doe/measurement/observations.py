@@ -53,7 +53,8 @@ def read_observations(
     for replicate in range(table.replicates + 1, scanned + 1):
         if replicate not in pile_paths:
             raise MeasurementError(
-                f"{pile_paths[replicates]}: replicate {replicate} is missing of {scanned}; allowed: from 1 on"
+                f"{pile_paths[replicates]}: replicate {replicate} of {scanned} is missing; allowed: numbered from 1 "
+                "without gaps"
             )
     stated = _padded(table.values, replicates)
     piles: Values = {}
@@ -87,7 +88,7 @@ def read_observations(
             observation = _observation(observable, x, values, uncertainty, "table")
             if not _has_spread(observation):
                 raise MeasurementError(
-                    f"{table_path}: {observable}: one replicate has no scatter; allowed: two replicates or more, or "
+                    f"{table_path}: {observable}: one replicate has no scatter; allowed: two or more replicates, or "
                     f"{observable} in [uncertainty]"
                 )
             observations.append(observation)

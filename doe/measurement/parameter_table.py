@@ -52,7 +52,7 @@ def read_parameters(
     for path, entry in table.items():
         parameter = _declared(path, scenes)
         if parameter.path in found:
-            raise MeasurementError(f"parameters.{path}: stands twice; allowed: each parameter once")
+            raise MeasurementError(f"parameters.{path}: appears twice; allowed: each parameter once")
         found[parameter.path] = _measured(parameter, entry, notes)
     return tuple(found.values()), tuple(notes)
 
@@ -75,7 +75,7 @@ def _measured(parameter: Parameter, entry: ParameterTable, notes: list[str]) -> 
         None if given is None else parse_quantity(given, parameter.unit, f"{where}.{key}") for key, given in entry
     )
     if sd is not None and (mean is None or sd <= 0.0):
-        raise MeasurementError(f"{where}.sd: {sd:g}; allowed: more than 0, beside a mean")
+        raise MeasurementError(f"{where}.sd: {sd:g}; allowed: more than 0, together with a mean")
     if (low is None or high is None) and (mean is None or sd is None):
         raise MeasurementError(f"{where}: no range; allowed: low and high, or mean and sd")
     if mean is not None and sd is not None:
@@ -110,7 +110,7 @@ def narrowed(parameter: MeasuredParameter, scenes: Sequence[Scene]) -> MeasuredP
             if not _taken(scene, parameter.path, end):
                 ends[k] = _last_taken(scene, parameter, end)
     if not ends[0] < ends[1]:
-        raise MeasurementError(f"parameters.{parameter.path}: no value of its range suits all conditions")
+        raise MeasurementError(f"parameters.{parameter.path}: no value of its range is allowed in all conditions")
     return replace(parameter, low=ends[0], high=ends[1])
 
 

@@ -61,7 +61,9 @@ def photograph_values(folder: Path, images: Sequence[PhotographTable]) -> tuple[
         replicate = image.replicate or place
         view = f"angle_of_repose_deg@{image.azimuth % 360.0:g}"
         if (view, replicate) in single:
-            raise MeasurementError(f"images: two of replicate {replicate} and one azimuth; allowed: one")
+            raise MeasurementError(
+                f"images: two photographs of replicate {replicate} at azimuth {image.azimuth:g}; allowed: one"
+            )
         read = _read(folder / image.file, image)
         if isinstance(read, str):
             ignored.append(read)

@@ -134,7 +134,7 @@ def scan_files(folder: Path, conditions: Iterable[str]) -> tuple[dict[str, dict[
         known = path.suffix.lower() in SURFACES + POINTS + ARRAYS + IMAGES
         if known and name in found and replicate.isdecimal() and int(replicate) >= 1:
             if int(replicate) in found[name]:
-                raise MeasurementError(f"{path}: replicate {replicate} has another scan; allowed: one file each")
+                raise MeasurementError(f"{path}: replicate {replicate} has more than one scan; allowed: one file")
             found[name][int(replicate)] = path
         else:
             strangers.append(path)
@@ -154,7 +154,7 @@ def read_scan(path: Path, settings: ScanSettings) -> Scan:
         points, grid = _points(path, settings)
         points = points[np.isfinite(points).all(axis=1)]
         if not FEWEST <= len(points) <= MOST_POINTS:
-            raise MeasurementError(f"{len(points)} points that are finite; allowed: {FEWEST} to {MOST_POINTS}")
+            raise MeasurementError(f"{len(points)} finite points; allowed: {FEWEST} to {MOST_POINTS}")
         a, b, c = settings.plate or found_plate(points)
         points = points - [0.0, 0.0, a]
         points[:, 2] -= points[:, :2] @ [b, c]
@@ -193,7 +193,7 @@ def found_plate(points: Array) -> tuple[float, float, float]:
     share = len(low) / len(points)
     if share < PLATE_SHARE:
         raise MeasurementError(
-            f"no bare plate is seen ({share:.0%} of the points lie in one plane); state scan.plate = [a, b, c]"
+            f"no bare plate found (only {share:.0%} of the points lie in one plane); state scan.plate = [a, b, c]"
         )
     return float(plane[0] - plane[1:] @ middle), float(plane[1]), float(plane[2])
 
@@ -209,7 +209,7 @@ def _volume_centre(points: Array, grid: float) -> Array:
     """Mean place over the volume above the plate, of points that are as dense everywhere."""
     height = np.where(points[:, 2] > 2.0 * grid, points[:, 2], 0.0)
     if height.sum() <= 0.0:
-        raise MeasurementError("nothing stands on the plate; state scan.axis = [x, y]")
+        raise MeasurementError("nothing lies on the plate; state scan.axis = [x, y]")
     return np.asarray(height @ points[:, :2] / height.sum(), dtype=np.float64)
 
 
@@ -259,7 +259,7 @@ def _sampled(triangles: Array) -> Array:
         steps = [(i, j) for i in range(k + 1) for j in range(k + 1 - i)]
         weight = np.array([(k - i - j, i, j) for i, j in steps], dtype=np.float64) / k
         if len(weight) * int(some.sum()) > MOST_POINTS:
-            raise MeasurementError("its facets differ too much in size; allowed: a surface of evenly fine facets")
+            raise MeasurementError("its facets differ too much in size; allowed: facets of similar size")
         found.append(np.einsum("pk,tkd->tpd", weight, triangles[some]).reshape(-1, 3))
     return np.concatenate(found)
 
@@ -312,13 +312,13 @@ def _of_image(path: Path, settings: ScanSettings) -> tuple[Array, float]:
     from PIL import Image, UnidentifiedImageError
 
     if settings.pixel is None or settings.step is None:
-        raise MeasurementError("scan.pixel and scan.step: missing; an image does not say how large it is")
+        raise MeasurementError("scan.pixel or scan.step: missing; an image needs both for its scale")
     try:
         with Image.open(path) as image:
             if image.width * image.height > MOST_POINTS:
-                raise MeasurementError(f"{image.width} × {image.height} pixels; allowed: {MOST_POINTS} in all")
+                raise MeasurementError(f"{image.width} × {image.height} pixels; allowed: up to {MOST_POINTS} in all")
             if not image.mode.startswith("I"):
-                raise MeasurementError(f"an image of mode {image.mode}; allowed: one channel of 16 bit")
+                raise MeasurementError(f"an image of mode {image.mode}; allowed: one channel of 16 or 32 bits")
             counts = np.asarray(image, dtype=np.float64)
     except (UnidentifiedImageError, OSError, ValueError) as error:
         if isinstance(error, MeasurementError):

@@ -37,7 +37,7 @@ def stages_of(study: Study) -> tuple[Stage, ...]:
         before = [one.name for one in order]
         if stage.after not in before:
             raise StudyFileError(
-                f"stage.{name}: follows {stage.after!r}, which is no stage before it: {', '.join(before)}"
+                f"stage.{name}: follows {stage.after!r}, which is not among the stages before it: {', '.join(before)}"
             )
         order.insert(before.index(stage.after) + 1, stage)
     return tuple(order)

@@ -59,7 +59,7 @@ class Stage(ABC):
     def check(self, study: Study, table: Mapping[str, Any]) -> None:
         """Refuse a table ``[stage.NAME]`` with a StudyFileError; by default one that is not empty."""
         if table:
-            raise StudyFileError(f"stage.{self.name}.{next(iter(table))}: unknown key; this stage takes none")
+            raise StudyFileError(f"stage.{self.name}.{next(iter(table))}: unknown key; allowed: none")
 
     def planned_runs(self, study: Study, profile: Profile) -> int:
         """Valid runs that it will make, replacements of failed runs not counted."""

@@ -57,8 +57,8 @@ def compare(before: StudyResult, now: StudyResult) -> tuple[Compared, ...]:
     """
     if before.verification.targets != now.verification.targets:
         raise BaselineError(
-            f"is of other targets than this study: {_targets(before)}; this one: {_targets(now)}; a baseline is the "
-            "result.json of the same study"
+            f"has other targets ({_targets(before)}) than this study ({_targets(now)}); allowed: the result.json of a "
+            "study with the same targets"
         )
     return (*_verified(before, now), *_noise(before, now), *_parameters(before, now))
 

@@ -425,7 +425,7 @@ def _experiments(material: Scene, table: Settings, path: Path, factors: Sequence
         if not EXPERIMENT.fullmatch(name):
             raise StudyFileError(f"experiment.name: {name!r} is no name; allowed: 1 to 60 letters, digits, - and _")
         if name in found:
-            raise StudyFileError(f"experiment.name: {name!r} stands twice")
+            raise StudyFileError(f"experiment.name: {name!r} appears twice")
         try:
             other = with_set_up(material, shared | own, path.parent)
         except ParameterError as error:
@@ -471,7 +471,7 @@ def _refuse_twins(factors: list[Factor]) -> None:
         for factor in factors:
             value = getattr(factor, key)
             if value in seen:
-                raise StudyFileError(f"factor.{key}: {value!r} stands twice among the factors and assumptions")
+                raise StudyFileError(f"factor.{key}: {value!r} appears twice among the factors and assumptions")
             seen.add(value)
 
 
@@ -493,7 +493,7 @@ def _changes(scene: Scene, changes: list[ChangeTable]) -> dict[str, Values]:
     found: dict[str, Values] = {}
     for entry in changes:
         if entry.name in found:
-            raise StudyFileError(f"change.name: {entry.name!r} stands twice")
+            raise StudyFileError(f"change.name: {entry.name!r} appears twice")
         if not entry.values:
             raise StudyFileError(f"change.values: {entry.name!r} changes nothing; a path and its value are needed")
         with_values(scene, entry.values)

@@ -102,7 +102,7 @@ def run_campaign(order: CampaignOrder, say: Say, listener: CampaignListener | No
     title, asked = laboratory.declared.title, order.asked(laboratory)
     known = {(row.root, row.number, row.offer) for row in read_rows(path) if row.laboratory == title}
     todo = [case for case in asked if not known.issuperset((*case.seed, offer) for offer in OFFERS)]
-    say(f"{path}: {len(asked) - len(todo)} of {len(asked)} data sets are there")
+    say(f"{path}: {len(asked) - len(todo)} of {len(asked)} data sets are done")
     deadline = time.monotonic() + 60.0 * order.minutes
     if todo and order.minutes > 0.0:
         with ExitStack() as stack:
@@ -124,7 +124,7 @@ def run_campaign(order: CampaignOrder, say: Say, listener: CampaignListener | No
                         done = len(asked) - len(todo) + judged_now
                         listener.judged(done, len(asked), judged_now, f"{case.number}: {rows[-1].verdict}")
             except OutOfTimeError:
-                say(f"{order.minutes:g} min are over; all pours are kept, and the same command goes on")
+                say(f"{order.minutes:g} min are over; all pours are kept, and the same command continues")
     wanted = {case.seed for case in asked}
     return [row for row in read_rows(path) if row.laboratory == title and (row.root, row.number) in wanted]
 

@@ -151,7 +151,7 @@ def read_laboratory(path: Path) -> Laboratory:
         for entry in table.get("condition", []):
             if "data" in entry:
                 raise MeasurementError(
-                    f"condition.data: {entry['data']!r}; a laboratory has no data before it is asked for some"
+                    f"condition.data: {entry['data']!r}; not allowed, as a laboratory file holds no data"
                 )
         _check_ranges(own.scanner)
         reference = None if own.reference is None else asset_path("validation", own.reference, relative_to=path.parent)
@@ -163,6 +163,7 @@ def read_laboratory(path: Path) -> Laboratory:
 def _check_ranges(ranges: ScannerRanges) -> None:
     for key, values in dataclasses.asdict(ranges).items():
         if not values or min(values) < 0.0 or (key == "grid" and min(values) == 0.0) or list(values) != sorted(values):
+            allowed = "above 0" if key == "grid" else "of 0 or more"
             raise MeasurementError(
-                f"laboratory.scanner.{key}: {list(values)}; allowed: lengths from the smallest to the largest"
+                f"laboratory.scanner.{key}: {list(values)}; allowed: lengths {allowed} in ascending order"
             )

@@ -353,7 +353,7 @@ def metric_of(sample: ReferencePours, replicates: int = REPLICATES) -> Metric:
     """
     for c, base in enumerate(sample.pours["base"]):
         if len(base) < 3:
-            raise StatisticsError(f"base: {len(base)} pours of condition {c + 1}; allowed: at least 3")
+            raise StatisticsError(f"base model: {len(base)} pours in condition {c + 1}; allowed: at least 3")
     varying = np.concatenate(sample.vary())
     sample = sample.varying()
     sensitivity = np.column_stack(
@@ -389,7 +389,7 @@ def fold_shifts(sample: ReferencePours, name: str, folds: int = FOLDS) -> FloatA
     """
     least = min(len(block) for kind in (name, "base") for block in sample.pours[kind])
     if least < folds:
-        raise StatisticsError(f"{name}: {least} pours in a condition that count; allowed: at least {folds}")
+        raise StatisticsError(f"{name}: {least} valid pours in a condition; allowed: at least {folds}")
     parts = []
     for there, base in zip(sample.pours[name], sample.pours["base"], strict=True):
         parts.append(_fold_means(there, folds) - _fold_means(base, folds))

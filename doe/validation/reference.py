@@ -195,7 +195,7 @@ def kept(path: Path, measurement: Measurement, physics: int) -> Reference:
     for name in ("title", "physics", "readings", "features"):
         if getattr(found, name) != getattr(now, name):
             there = repr(getattr(found, name)) if name != "features" else "of its pours"
-            raise StatisticsError(f"{path}: {name} {there} is not that of today; name another file")
+            raise StatisticsError(f"{path}: {name} {there} is out of date; name another file")
     return found
 
 

@@ -225,7 +225,7 @@ def no_repeats(factors: tuple[DesignFactor, ...], responses: tuple[str, ...]) ->
     columns = [*(factor.name for factor in factors), *responses]
     for name in columns:
         if columns.count(name) > 1:
-            raise StudyFileError(f"name {name!r} stands twice; allowed: each column once")
+            raise StudyFileError(f"name {name!r} appears twice; allowed: each column once")
 
 
 def _factor(table: FactorTable, where: str) -> DesignFactor:

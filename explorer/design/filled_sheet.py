@@ -190,7 +190,7 @@ def _columns(path: Path, titles: list[tuple[str, str]]) -> dict[str, int]:
     names = [name for name, _ in titles]
     for name in names:
         if name and names.count(name) > 1:
-            raise CommandError(f"{path}: column {short(name)} stands twice; allowed: each name once")
+            raise CommandError(f"{path}: column {short(name)} appears twice; allowed: each name once")
     return {name: position for position, name in enumerate(names) if name}
 
 

@@ -41,7 +41,8 @@ class ShapeElongation(SetUpEffect):
         solid = body.shape
         if solid.kind not in DIMENSIONS or not DIMENSIONS[solid.kind]:
             raise ParameterError(
-                f"effect.shape_elongation.elongation: a mesh ({body.name}) cannot be stretched; give another file"
+                f"effect.shape_elongation.elongation: body {body.name} is a mesh, which cannot be stretched; "
+                "allowed: 0, or a mesh file of the elongated shape"
             )
         if solid.kind == "sphere":
             size = solid.dimensions[0]

@@ -38,8 +38,8 @@ class SizeDispersion(SetUpEffect):
             together = (before**2 + self.spread**2) ** 0.5
             if together > MOST_SPREAD:
                 raise ParameterError(
-                    f"effect.size_dispersion.spread: {self.spread:g} beside the declared {before:g} makes "
-                    f"{together:.3g}; allowed: up to {MOST_SPREAD:g}"
+                    f"effect.size_dispersion.spread: {self.spread:g} and the declared size_spread {before:g} combine "
+                    f"to {together:.3g}; allowed: up to {MOST_SPREAD:g}"
                 )
             return SizeDistribution(kind, together)
 

@@ -41,7 +41,9 @@ def normal_damping(restitution: float) -> float:
 def damping_ratio(restitution: float) -> float:
     """ζ, dimensionless, for a restitution 0 < e ≤ 1; 0 for e = 1. Good to 1e-9 of itself."""
     if not 0.0 < restitution <= 1.0:
-        raise ValueError(f"restitution: {restitution:g} is outside 0 … 1 (0 itself has no finite damping)")
+        raise ValueError(
+            f"restitution: {restitution:g}; allowed: more than 0 (which needs infinite damping) and at most 1"
+        )
     wanted = -math.log(restitution)
     # exponent(ζ) ≥ 2 acosh ζ bounds ζ from above.
     low, high = 0.0, max(1.0, math.cosh(wanted / 2.0))

@@ -28,7 +28,7 @@ def scanned_pile(scene: Scene, centre: Array, radius: Array, body: npt.NDArray[n
     """The pile of the bodies of ``scene``; raises ParameterError for arrays that are no such pile."""
     if len(scene.bodies) != 1:
         names = ", ".join(declared.name for declared in scene.bodies)
-        raise ParameterError(f"body: a scan does not say which of {names} a body is; allowed: one component")
+        raise ParameterError(f"body: a scan does not tell {names} apart; allowed: a material of one component")
     _check(centre, radius, body)
     clump = scene.bodies[0].clump
     members = len(clump.radii)
@@ -61,7 +61,9 @@ def centre_weights(centres: Array, size: float) -> Array:
     conditions = np.vstack([centres.T / size, np.ones(len(centres))])
     weights: Array = np.linalg.lstsq(conditions, np.array([0.0, 0.0, 0.0, 1.0]), rcond=None)[0]
     if np.abs(conditions @ weights - [0.0, 0.0, 0.0, 1.0]).max() > CENTRE_SLACK:
-        raise ParameterError("sphere_centres: the centre of mass does not follow from them, as it lies beside them all")
+        raise ParameterError(
+            "sphere_centres: the centre of mass cannot be computed from them, as it lies to one side of them all"
+        )
     return weights
 
 
@@ -72,6 +74,6 @@ def _check(centre: Array, radius: Array, body: npt.NDArray[np.integer]) -> None:
             f"xyz, radius, body: shapes {centre.shape}, {radius.shape}, {body.shape}; allowed: (n, 3), (n,), (n,)"
         )
     if not (np.isfinite(centre).all() and np.isfinite(radius).all() and (radius > 0.0).all()):
-        raise ParameterError("xyz, radius: a value is not finite or a radius not positive")
+        raise ParameterError("xyz, radius: a value is not finite, or a radius is not positive")
     if not np.issubdtype(body.dtype, np.integer):
         raise ParameterError(f"body: numbers of type {body.dtype}; allowed: whole numbers")

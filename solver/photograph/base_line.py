@@ -77,8 +77,8 @@ def rough_base_line(part: Image) -> BaseLine:
         where = " and ".join([*at_side, *(["lower"] if part[-1].any() else [])])
         raise NotAPile(
             Reason.CUT_BY_FRAME,
-            f"what stands out reaches the {where} edge of the picture, with no level plate on both sides of it; "
-            "show the whole pile, and the plate's edge from its level; or state --baseline",
+            f"the silhouette reaches the {where} edge of the picture, and no level plate is seen on both sides of it; "
+            "show the whole pile with the camera level with the plate, or state --baseline",
         )
     try:
         return _foot(x, bottoms)
@@ -133,8 +133,8 @@ def check_tilt(line: BaseLine) -> None:
     if abs(line.tilt_deg) > MOST_TILT_DEG:
         raise NotAPile(
             Reason.TILTED_CAMERA,
-            f"the base line slopes by {line.tilt_deg:+.1f}°, allowed up to {MOST_TILT_DEG:g}°; level the camera, or "
-            "state --baseline where the line found is wrong",
+            f"the base line slopes by {line.tilt_deg:+.1f}°; allowed: up to {MOST_TILT_DEG:g}°; level the camera, or "
+            "state --baseline if the line found is wrong",
         )
 
 
@@ -171,7 +171,7 @@ def _shoulders(x: Array, tops: Array, bottoms: Array, across: bool) -> BaseLine 
 def _foot(x: Array, bottoms: Array) -> BaseLine:
     inner = slice(round(INNER * x.size), x.size - round(INNER * x.size))
     if x[inner].size < 5:
-        raise NotAPile(Reason.TOO_SMALL, f"what stands out is {x.size} pixels wide in the reduced picture")
+        raise NotAPile(Reason.TOO_SMALL, f"the silhouette is only {x.size} pixels wide in the reduced picture")
     fitted = _fitted(x[inner], bottoms[inner], "foot", float(x[0]), float(x[-1]))
     return replace(fitted, above_deg=_above_deg(x, bottoms))
 
@@ -191,8 +191,8 @@ def _above_deg(x: Array, bottoms: Array) -> float:
         degrees = np.degrees(np.arcsin(min(1.0, 2.0 * sag)))
         raise NotAPile(
             Reason.CAMERA_LOOKS_DOWN,
-            f"the foot of the pile bulges by {sag:.0%} of its width, as seen from {degrees:.0f}° above; "
-            "bring the camera down to the plate",
+            f"the foot of the pile is curved by {sag:.0%} of its width, as when seen from {degrees:.0f}° above; "
+            "lower the camera to the level of the plate",
         )
     alone = terms[:, 2] - terms[:, :2] @ np.linalg.lstsq(terms[:, :2], terms[:, 2], rcond=None)[0]
     miss = bottoms[inner] - terms @ coefficients

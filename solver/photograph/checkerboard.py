@@ -64,21 +64,21 @@ def board_of(picture: Picture) -> Board:
     places, indices = _grid(_corners(grey))
     if len(places) < FEWEST:
         raise PhotographError(
-            f"{picture.name}: no checkerboard: {len(places)} corners of a grid, at least {FEWEST} are needed; show the "
-            "board large, flat and sharp"
+            f"{picture.name}: no checkerboard: {len(places)} corners of a grid found; at least {FEWEST} are needed; "
+            "show the board large, flat and sharp"
         )
     x, y, half = centred(places[:, 0], places[:, 1], grey.shape)
     reach = float(np.hypot(x, y).max())
     if reach < LEAST_REACH:
         raise PhotographError(
             f"{picture.name}: the checkerboard reaches {reach:.0%} of the way from the middle of the picture to its "
-            f"corner, at least {LEAST_REACH:.0%} are needed; go nearer"
+            f"corner; at least {LEAST_REACH:.0%} is needed; go nearer"
         )
     k, error, miss = _fitted(np.stack([x, y], axis=1), indices)
     if miss * half > MOST_MISS or abs(k) > MOST:
         raise PhotographError(
-            f"{picture.name}: its {len(places)} corners miss those of a plane board by {miss * half * scale:.1f} px "
-            f"(k = {k:+.2f}); lay the checkerboard flat, and show nothing else"
+            f"{picture.name}: its {len(places)} corners deviate from those of a flat board by "
+            f"{miss * half * scale:.1f} px (k = {k:+.2f}); lay the checkerboard flat, and show nothing else"
         )
     return Board(
         picture.name, Bend(k, error), len(places), miss * half * scale * picture.reduced, picture.width / picture.height

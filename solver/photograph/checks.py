@@ -47,7 +47,7 @@ def check_alone(part: Image, others: Sequence[Image], line: BaseLine) -> None:
         if stands and other.sum() >= SECOND_AREA * area and _height(other, line) >= SECOND_HEAP * height:
             raise NotAPile(
                 Reason.TWO_PILES,
-                f"beside the largest part stands another of {other.sum() / area:.0%} of its area; show one pile",
+                f"beside the largest silhouette is another with {other.sum() / area:.0%} of its area; show one pile",
             )
 
 
@@ -83,7 +83,7 @@ def check_size(height: float) -> None:
     """NotAPile for a pile of ``height`` [pixels of the picture] of which nothing can be read."""
     if height < LEAST_HEIGHT:
         raise NotAPile(
-            Reason.TOO_SMALL, f"the pile is {height:.0f} pixels high, at least {LEAST_HEIGHT:g} are needed; go nearer"
+            Reason.TOO_SMALL, f"the pile is {height:.0f} pixels high; at least {LEAST_HEIGHT:g} are needed; go nearer"
         )
 
 
@@ -92,8 +92,8 @@ def check_edge(contrast: float, faintest: float, noise: float) -> None:
     if faintest < FAINT * contrast:
         raise NotAPile(
             Reason.NO_CLEAR_SILHOUETTE,
-            f"somewhere the edge fades into the backdrop: {faintest:.0f} of 255 grey levels where {contrast:.0f} are "
-            "usual; use an even backdrop and light",
+            f"part of the edge fades into the backdrop: its contrast is {faintest:.0f} of 255 grey levels, elsewhere "
+            f"{contrast:.0f}; use an even backdrop and even light",
         )
     if contrast < max(LEAST_EDGE, 1.5 * noise):
         raise NotAPile(
@@ -122,12 +122,13 @@ def check_flanks(
         if not FLATTEST_DEG <= line.angle_deg <= STEEPEST_DEG:
             raise NotAPile(
                 Reason.NO_FLANK,
-                f"the {side} side slopes by {line.angle_deg:.0f}°; a pile's by {FLATTEST_DEG:g} … {STEEPEST_DEG:g}°",
+                f"the {side} side slopes by {line.angle_deg:.0f}°; allowed: {FLATTEST_DEG:g} … {STEEPEST_DEG:g}°",
             )
         if rough > MOST_ROUGHNESS * 0.6 * height:
             raise NotAPile(
                 Reason.NO_FLANK,
-                f"the {side} side is no slope: it misses its line by {rough / height:.0%} of the height",
+                f"the {side} side is not a straight slope: it deviates from its fitted line by {rough / height:.0%} of "
+                "the height",
             )
     left, right = lines
     assert left is not None
@@ -140,8 +141,8 @@ def check_below(share: float) -> None:
     if share > MOST_BELOW:
         raise NotAPile(
             Reason.CAMERA_LOOKS_DOWN,
-            f"the flanks go on below the base line, by {share:.0%} of the height at least: the plate is seen from "
-            "above and its edge lies behind the pile; bring the camera down to the plate, or state --baseline",
+            f"the flanks continue below the base line by at least {share:.0%} of the height: the plate is seen from "
+            "above and its edge lies behind the pile; lower the camera to the level of the plate, or state --baseline",
         )
 
 
@@ -151,15 +152,15 @@ def check_bend(thirds_deg: Sequence[Sequence[float]], bend_deg: Sequence[float])
         if bend > MOST_BEND_DEG:
             lower, middle, upper = thirds
             cause = (
-                "a body under the pile, or a spread foot; state where the pile's foot is by --baseline"
+                "something lies under the pile, or its foot is spread out; state the pile's foot with --baseline"
                 if abs(lower - middle) >= abs(upper - middle) or not np.isfinite(lower)
-                else "a funnel's tip or a round top; take it away, or show the flanks alone"
+                else "the tip of a funnel or a round top; remove it, or show the flanks alone"
             )
             words = ", ".join("none" if not np.isfinite(one) else f"{one:.0f}°" for one in thirds)
             raise NotAPile(
                 Reason.BENT_FLANK,
-                f"the {side} flank has no one slope: {words} in its lower, middle and upper third, more than bodies "
-                f"give; {cause}",
+                f"the {side} flank has no single slope: {words} in its lower, middle and upper third, which the size "
+                f"of the bodies does not explain; {cause}",
             )
 
 
@@ -175,8 +176,8 @@ def check_photographed(noise: float, inside: Array, outside: Array, roughness: f
     if noise <= DRAWN_NOISE and flat and roughness <= DRAWN_MISS:
         raise NotAPile(
             Reason.DRAWN,
-            "both sides of the edge have one grey level without noise, and the flanks are straight to a pixel: no "
-            "photograph of a pile has that",
+            "each side of the edge has one grey level without noise, and the flanks are straight to a pixel: this is a "
+            "drawing, not a photograph of a pile",
         )
 
 
@@ -184,7 +185,8 @@ def check_levels(shift_deg: float) -> None:
     """NotAPile where a flank that is there at one threshold cannot be read at the next (``shift_deg`` infinite)."""
     if not np.isfinite(shift_deg):
         raise NotAPile(
-            Reason.NO_CLEAR_SILHOUETTE, "a flank comes and goes with the threshold: the edge is blurred or shaded away"
+            Reason.NO_CLEAR_SILHOUETTE,
+            "a flank is found at some grey thresholds only: the edge is blurred or in shadow",
         )
 
 

@@ -82,7 +82,7 @@ def _clearest(small: Array, light: Illumination, found: Sequence[Candidate], giv
         raise max(reasons, key=lambda one: int(one[0].sum()))[1]
     raise NotAPile(
         Reason.NO_CLEAR_SILHOUETTE,
-        "no connected part stands out from the backdrop; use an even backdrop of another grey than the pile",
+        "nothing connected stands out from the backdrop; use an even backdrop that differs in grey from the pile",
     )
 
 
@@ -104,7 +104,7 @@ def _sharpness(small: Array, part: Bool, line: BaseLine) -> float:
     flank = (above > 0.2 * above.max()) & (above < 0.95 * above.max())
     sides = [change[flank & side] for side in (np.arange(columns.size) < apex, np.arange(columns.size) > apex)]
     if any(side.size < 3 for side in sides):
-        raise NotAPile(Reason.NO_FLANK, "what stands out has no slope on both sides of its top")
+        raise NotAPile(Reason.NO_FLANK, "the silhouette does not slope on both sides of its top")
     return min(float(np.median(side)) for side in sides)
 
 

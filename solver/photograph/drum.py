@@ -136,10 +136,13 @@ def _read(picture: Picture) -> PhotographedDrum:
     _check_surface(places, height)
     angle = slope_angle_deg(places, height, WINDOW)
     if abs(angle) < LEAST_ANGLE:
-        raise NotAPile(Reason.NO_SURFACE, "the line across the drum is level: it does not turn, or that is no bed")
+        raise NotAPile(
+            Reason.NO_SURFACE,
+            "the line across the drum is level: the drum does not turn, or this is not the surface of a bed",
+        )
     width = edge_width(patch, column_tops(images[LEVELS.index(0.5)]).astype(np.float64), contrast) * patch.step
     if width > WIDEST * radius:
-        raise NotAPile(Reason.NO_SURFACE, "light and dark go over into each other slowly, as under slanting light")
+        raise NotAPile(Reason.NO_SURFACE, "light and dark blend gradually at the surface, as under slanting light")
     level = 0.5 * abs(slope_angle_deg(places, low, WINDOW) - slope_angle_deg(places, high, WINDOW))
     aslant = float(np.degrees(ellipse * np.sin(2.0 * np.radians(abs(angle)))))
     error = float(np.linalg.norm([_line_error_deg(places, height), level, aslant]))
@@ -190,7 +193,8 @@ def _circle(grey: Array) -> tuple[float, float, float, float]:
     best = max(share for share, *_ in refined)
     if best < SEEN:
         raise NotAPile(
-            Reason.NO_DRUM, f"no circle: of the clearest one {best:.0%} can be seen; the whole face has to be in it"
+            Reason.NO_DRUM,
+            f"no circle found: only {best:.0%} of the clearest one is visible; show the whole face of the drum",
         )
     clear = sorted((r, x, y) for share, x, y, r in refined if share >= max(SEEN, CLEAR * best))
     largest, x0, y0 = clear[-1]
@@ -298,11 +302,11 @@ def _check_circle(grey: Array, x: float, y: float, radius: float, ellipse: float
     """Refuse a drum that is not seen whole, or aslant."""
     beyond = max(radius - x, radius - y, x + radius - grey.shape[1], y + radius - grey.shape[0])
     if beyond > OUTSIDE * radius:
-        raise NotAPile(Reason.CUT_BY_FRAME, f"{beyond / radius:.0%} of the drum's radius lie outside the picture")
+        raise NotAPile(Reason.CUT_BY_FRAME, f"{beyond / radius:.0%} of the drum's radius lies outside the picture")
     if ellipse > ASLANT:
         raise NotAPile(
             Reason.CAMERA_ASLANT,
-            f"the rim is an ellipse, its longer axis {2.0 * ellipse:.1%} over the mean: look along the drum's axis",
+            f"the rim is an ellipse; its longer axis is {2.0 * ellipse:.1%} over the mean; look along the drum's axis",
         )
 
 
@@ -318,7 +322,7 @@ def _bed(grey: Array, x: float, y: float, radius: float) -> tuple[Image, float, 
     smooth = ndimage.gaussian_filter(np.where(face, grey, 0.0), TEXTURE * radius) / np.maximum(weight, 1e-6)
     threshold = otsu(smooth[face])
     if not np.isfinite(threshold):
-        raise NotAPile(Reason.BLANK, "the drum is of one tone")
+        raise NotAPile(Reason.BLANK, "the face of the drum has one tone: no bed stands out")
     dark = face & (smooth < threshold)
     light = face & ~dark
     contrast = float(np.median(smooth[light]) - np.median(smooth[dark])) if dark.any() and light.any() else 0.0
@@ -329,7 +333,10 @@ def _bed(grey: Array, x: float, y: float, radius: float) -> tuple[Image, float, 
     bed = largest_part(dark if rows[dark].mean() > rows[light].mean() else light)
     filled = float(bed.sum() / face.sum())
     if not FILLED[0] <= filled <= FILLED[1]:
-        raise NotAPile(Reason.NO_SURFACE, f"the lower tone covers {filled:.0%} of the drum; a bed has a surface")
+        raise NotAPile(
+            Reason.NO_SURFACE,
+            f"the lower tone covers {filled:.0%} of the drum; allowed: {FILLED[0]:.0%} … {FILLED[1]:.0%}",
+        )
     return bed, contrast, filled
 
 
@@ -353,7 +360,7 @@ def _middle(grey: Array, bed: Image, x: float, y: float, radius: float) -> tuple
     crossed = float((full & ~rough).sum() / full.sum())
     if crossed > CROSSED:
         raise NotAPile(
-            Reason.NO_SURFACE, f"{crossed:.0%} of what lies below the bed's top is no bed: something crosses it"
+            Reason.NO_SURFACE, f"{crossed:.0%} of the area below the bed's surface is not bed: something covers it"
         )
     band = max(3.0, 1.5 * TEXTURE * radius / step)
     return Patch(seen, full, step, band, (x + float(u[0]), y + radius), (1.0, 0.0)), 0.5 * n * step / radius
@@ -371,10 +378,10 @@ def _check_surface(x: Array, height: Array) -> None:
     window = np.abs(x) <= WINDOW
     known = window & np.isfinite(height)
     if np.count_nonzero(known) < LEAST_WINDOW * np.count_nonzero(window):
-        raise NotAPile(Reason.NO_SURFACE, "the bed's surface does not reach over the middle half of the drum")
+        raise NotAPile(Reason.NO_SURFACE, "the bed's surface does not span the middle half of the drum")
     off = height[known] - np.polyval(np.polyfit(x[known], height[known], 1), x[known])
     if float(np.sqrt(np.mean(off**2))) > STRAIGHT:
-        raise NotAPile(Reason.NO_SURFACE, "what stands out in the drum has no even surface")
+        raise NotAPile(Reason.NO_SURFACE, "what stands out in the drum has no straight surface")
 
 
 def _line_error_deg(x: Array, height: Array) -> float:

@@ -102,7 +102,7 @@ def upright(grey: Array, part: Image, line: BaseLine, scale: float) -> Patch:
     above = z >= min(max(FOOT * top, 1.5 * scale), z.max())
     left, right = float(u[above].min()), float(u[above].max())
     if right - left < LEAST_COLUMNS * scale:
-        raise NotAPile(Reason.NO_FLANK, "what stands above the base line is a few pixels wide")
+        raise NotAPile(Reason.NO_FLANK, "the silhouette above the base line is only a few pixels wide")
     margin = 8.0 * scale + MARGIN * (right - left)
     step = min(1.0, (right - left) / COLUMNS)
     n_columns = int(np.ceil((right - left + 2.0 * margin) / step))
@@ -268,5 +268,5 @@ def _mean_where(values: Array, where: Image, side: int) -> Array:
 def _flank_columns(tops: Array) -> npt.NDArray[np.intp]:
     columns = np.flatnonzero((tops > 0.2 * tops.max()) & (tops < NEAR_TOP * tops.max()))
     if columns.size == 0:
-        raise NotAPile(Reason.NO_FLANK, "what stands out has no slope on either side")
+        raise NotAPile(Reason.NO_FLANK, "the silhouette has no slope on either side")
     return columns

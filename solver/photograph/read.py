@@ -213,14 +213,17 @@ def _standing(
         patch = upright(grey, found.candidate.part, line, scale)
         seen = silhouettes(patch, noise)
         if not seen.images[1].any():
-            raise NotAPile(Reason.NO_CLEAR_SILHOUETTE, "nothing stands above the base line")
+            raise NotAPile(Reason.NO_CLEAR_SILHOUETTE, "nothing is seen above the base line")
         tops = column_tops(seen.images[1]).astype(np.float64)
         under = None if line.kind == "given" else support_under(tops, 1.0 / patch.step)
         if under is None:
             return patch, seen, tops, line
         line = _on(under, patch)
         check_tilt(line)
-    raise NotAPile(Reason.SUPPORT, "what stands out is a stack of bodies; state where the pile's foot is by --baseline")
+    raise NotAPile(
+        Reason.SUPPORT,
+        f"{MOST_SUPPORTS} or more objects are stacked under the pile; state the pile's foot with --baseline",
+    )
 
 
 def _on(under: Support, patch: Patch) -> BaseLine:

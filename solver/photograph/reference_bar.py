@@ -50,7 +50,7 @@ def reference_pixels(picture: Picture) -> float:
     if len(bars) != 1:
         raise NotAPile(
             Reason.NO_SCALE,
-            f"{len(bars) or 'no'} straight bar{'s' * (len(bars) != 1)} stand out, one is needed: at least "
+            f"{len(bars) or 'no'} straight bar{'s' * (len(bars) != 1)} stand out; exactly one is needed, at least "
             f"{LEAST_ASPECT:g} times as long as wide, apart from pile and frame; or state its ends by --reference",
         )
     return _between_ends(picture.grey.astype(np.float64), bars[0], scale) * picture.reduced

@@ -117,7 +117,7 @@ def resumed(batch: Batch, w: int, scene: Scene, kept: Checkpoint) -> Pour:
     Raises ParameterError if ``scene`` or the solver is not the one that was interrupted.
     """
     if kept.fingerprint != fingerprint(actual(scene)):
-        raise ParameterError("the checkpoint is of another scene or of another version of the solver")
+        raise ParameterError("the checkpoint belongs to another scene or another version of the solver")
     pour = Pour(batch, w, scene, kept.seed)
     decided = kept.decided
     for name in PLAIN:
@@ -159,7 +159,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
     except FileNotFoundError:
         raise ParameterError(f"{path}: no such file") from None
     except (OSError, TypeError, ValueError, KeyError) as error:
-        raise ParameterError(f"{path}: not a checkpoint, or a damaged one ({error})") from error
+        raise ParameterError(f"{path}: not a checkpoint, or damaged ({error})") from error
 
 
 def fingerprint(scene: Scene) -> str:

@@ -101,10 +101,12 @@ class DaskPool:
                     record: Record = future.result()
                 except KilledWorker:
                     raise WorkerLost(
-                        f"workers have ended over the same pour, seed {job.seed} of {job.scene.title!r}"
+                        f"several workers died on the same pour, seed {job.seed} of {job.scene.title!r}"
                     ) from None
                 except CancelledError:
-                    raise SchedulerError(f"--scheduler {self._address}: has ended, or forgotten these pours") from None
+                    raise SchedulerError(
+                        f"--scheduler {self._address}: the scheduler has stopped or lost these pours"
+                    ) from None
                 except SchedulerError:
                     raise
                 except Exception as error:
@@ -134,20 +136,20 @@ def _poured(job: Job, room: Room, asked_by: Program, key: str) -> Record:
     worker = get_worker()
     if (own := Program.here()) != asked_by:
         raise SchedulerError(
-            f"worker {worker.address}: has {own}, and pours are asked for by {asked_by}; install the same on both"
+            f"worker {worker.address}: has {own}, but the pours come from {asked_by}; install the same on both"
         )
     # Taichi belongs to the thread that started it, and a second one would pour no faster.
     if worker.state.nthreads != 1:
         raise SchedulerError(
             f"worker {worker.address}: has {worker.state.nthreads} threads; start it with --nthreads 1, and "
-            "--nworkers for as many pours at once"
+            "with --nworkers set to the number of pours at once"
         )
     try:
         same = pour_key(job.scene, job.seed) == key
     except OSError as error:
         raise SchedulerError(f"worker {worker.address}: {error.filename}: {error.strerror}") from None
     if not same:
-        raise SchedulerError(f"worker {worker.address}: has another version of a mesh file or of a plug-in")
+        raise SchedulerError(f"worker {worker.address}: its version of a mesh file or plug-in differs from that here")
     if _rooms is None:
         _rooms = Rooms()
         _rooms.begin(room)

@@ -189,9 +189,9 @@ class Pour:
         Raises ParameterError for a rig without a plate and while the plate moves already.
         """
         if PLATE not in self.rig.surface_names:
-            raise ParameterError(f"{self.rig.name}: has no plate that could be moved")
+            raise ParameterError(f"{self.rig.name}: has no plate that can be moved")
         if self._motion is not None:
-            raise ParameterError("the plate moves already; wait until it stands")
+            raise ParameterError("the plate is already moving; wait until it stops")
         self._motion, self.disturbed = (motion, self.time), True
         self._follow_motion(*self._motion)
         self._wake()
@@ -199,7 +199,7 @@ class Pour:
     def pull(self, pull: Pull | None) -> None:
         """Pull one body from now on, or none; wakes the pour up. Raises ParameterError for a body that is not there."""
         if pull is not None and not 0 <= pull.body < self.entered:
-            raise ParameterError(f"pull: there is no body no. {pull.body + 1}; {self.entered} have entered")
+            raise ParameterError(f"pull: there is no body {pull.body + 1}; {self.entered} have entered")
         self._pull, self.disturbed = pull, True
         self.apply_pull()
         self._wake()

@@ -107,7 +107,7 @@ def unpacked(raw: bytes) -> Record:
     except RawPourError:
         raise
     except (AttributeError, LookupError, TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise RawPourError(f"not a raw pour, or a damaged one ({error})") from error
+        raise RawPourError(f"not a raw pour, or damaged ({error})") from error
 
 
 def _unpacked(raw: bytes) -> Record:

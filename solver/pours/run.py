@@ -62,8 +62,8 @@ def sizes_for(scenes: Sequence[Scene], worlds: int) -> Capacity:
         numbers = body_counts(scene)
         if sum(numbers) > MOST_BODIES:
             raise ParameterError(
-                f"rig: {poured_mass(scene):g} kg are {sum(numbers)} bodies; a pour holds at most {MOST_BODIES}: pour "
-                "less, or larger ones"
+                f"rig: {poured_mass(scene):g} kg is {sum(numbers)} bodies; allowed: up to {MOST_BODIES} in a pour; "
+                "pour less mass or larger bodies"
             )
         bodies = max(bodies, sum(numbers))
         members = max(members, sum(n * len(b.clump.radii) for n, b in zip(numbers, scene.bodies, strict=True)))

@@ -67,7 +67,7 @@ class WorkerPool:
 
     def __init__(self, workers: int | None = None) -> None:
         if workers is not None and (not isinstance(workers, int | np.integer) or workers < 1):
-            raise ParameterError(f"workers {workers}: allowed: a whole number from 1 on")
+            raise ParameterError(f"workers {workers}: allowed: a whole number of at least 1")
         self.workers = workers or os.cpu_count() or 1
         """How many pour at the same time."""
         self._processes: list[tuple[BaseProcess, Connection]] = []
@@ -88,8 +88,8 @@ class WorkerPool:
             losses[id(job)] += 1
             if losses[id(job)] == LOSSES:
                 raise WorkerLost(
-                    f"{LOSSES} worker processes have ended over the same pour, seed {job.seed} of {job.scene.title!r}: "
-                    "killed from outside, or out of memory"
+                    f"{LOSSES} worker processes died on the same pour, seed {job.seed} of {job.scene.title!r}: "
+                    "killed from outside or out of memory"
                 )
             again = f"the pour with seed {job.seed} of {job.scene.title!r} is restarted on another worker"
             _log.warning("a worker process has ended (%d of %d losses): %s", losses[id(job)], LOSSES, again)

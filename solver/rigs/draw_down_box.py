@@ -119,6 +119,5 @@ class DrawDownBox(PourRig):
             )
         if self.slot_width <= widest_body:
             raise ParameterError(
-                f"rig.slot_width: {self.slot_width:g} m is narrower than a body ({widest_body:g} m); "
-                f"allowed: more than {widest_body:g} m"
+                f"rig.slot_width: {self.slot_width:g} m is too narrow for a body; allowed: more than {widest_body:g} m"
             )

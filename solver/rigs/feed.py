@@ -80,7 +80,8 @@ class BoxFeed:
         room = min(2.0 * self.half_x, 2.0 * self.half_y, self.ceiling - self.floor)
         if room <= longest_body:
             raise ParameterError(
-                f"rig: its feed opening is {room:g} m at its narrowest, too narrow for a body of {longest_body:g} m"
+                f"rig: the feed opening is {room:g} m at its narrowest, too narrow for a body of {longest_body:g} m; "
+                f"allowed: more than {longest_body:g} m"
             )
         _refuse_narrow(reach, longest_body)
 

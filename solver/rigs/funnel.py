@@ -98,6 +98,6 @@ class Funnel(PourRig):
             )
         if self.outlet_diameter <= widest_body:
             raise ParameterError(
-                f"rig.outlet_diameter: {self.outlet_diameter:g} m is narrower than a body "
-                f"({widest_body:g} m); allowed: more than {widest_body:g} m"
+                f"rig.outlet_diameter: {self.outlet_diameter:g} m is too narrow for a body; "
+                f"allowed: more than {widest_body:g} m"
             )

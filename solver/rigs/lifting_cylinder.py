@@ -94,6 +94,5 @@ class LiftingCylinder(PourRig):
         """Refuse a cylinder that a body cannot fall through."""
         if self.diameter <= widest_body:
             raise ParameterError(
-                f"rig.diameter: {self.diameter:g} m is narrower than a body ({widest_body:g} m); "
-                f"allowed: more than {widest_body:g} m"
+                f"rig.diameter: {self.diameter:g} m is too narrow for a body; allowed: more than {widest_body:g} m"
             )

@@ -48,7 +48,7 @@ class LippedPlate(LiftingCylinder):
             )
         if self.lip_diameter >= 2.0 * self.domain_half_width:
             raise ParameterError(
-                f"rig.lip_diameter: {self.lip_diameter:g} m stands beyond rig.domain_half_width "
-                f"({self.domain_half_width:g} m), where bodies are taken out; allowed: below "
+                f"rig.lip_diameter: {self.lip_diameter:g} m reaches rig.domain_half_width "
+                f"({self.domain_half_width:g} m), beyond which bodies are removed; allowed: below "
                 f"{2.0 * self.domain_half_width:g} m"
             )

@@ -112,22 +112,22 @@ class MeshFunnel(PourRig):
         for words, one in (("lower", placed.outlet), ("upper", placed.inlet)):
             if not one.closed:
                 raise ParameterError(
-                    f"rig.mesh: {name}: no wall goes round the axis of the outlet at its {words} end; the mesh has to "
-                    "stand upright (z up) and open, and its inlet above its outlet"
+                    f"rig.mesh: {name}: at its {words} end no wall encloses the axis of the outlet; the mesh must be "
+                    "upright (z up) and open, with its inlet above its outlet"
                 )
         if placed.shut:
             raise ParameterError(
-                f"rig.mesh: {name}: a face stands across the axis of the outlet; a funnel is open from top to bottom"
+                f"rig.mesh: {name}: a face blocks the axis of the outlet; a funnel must be open from top to bottom"
             )
         if 2.0 * placed.outlet.nearest <= widest_body:
             raise ParameterError(
-                f"rig.mesh: {name}: its outlet lets {2.0 * placed.outlet.nearest:.3g} m pass, narrower than a body "
-                f"({widest_body:.3g} m); allowed: more than that. Is its unit {self.unit}?"
+                f"rig.mesh: {name}: its outlet is {2.0 * placed.outlet.nearest:.3g} m wide, too narrow for a body; "
+                f"allowed: more than {widest_body:.3g} m. Is rig.unit = {self.unit!r} right?"
             )
         if placed.reach >= self.domain_half_width:
             raise ParameterError(
                 f"rig.mesh: {name}: reaches {placed.reach:.3g} m from its axis, beyond rig.domain_half_width "
-                f"({self.domain_half_width:g} m). Is its unit {self.unit}?"
+                f"({self.domain_half_width:g} m). Is rig.unit = {self.unit!r} right?"
             )
 
 
@@ -209,7 +209,7 @@ def _placed(file: Path, metres_per_unit: float, wall: str, stamp: int) -> Placed
     mesh = trimesh.Trimesh(vertices, np.array(shell.faces), process=False)
     cuts = [cut(mesh, z) for z in (low + RIM * height, high - RIM * height)]
     if not height > 0.0 or not all(map(len, cuts)):
-        raise ParameterError(f"rig.mesh: {file}: has no height; the mesh has to stand upright (z up)")
+        raise ParameterError(f"rig.mesh: {file}: has no height; the mesh must be upright (z up)")
     axis = middle(cuts[0])
     outlet, inlet = (opening(one, axis) for one in cuts)
     moved = vertices - (*axis, low)

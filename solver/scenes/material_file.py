@@ -323,7 +323,7 @@ def _pairs(table: dict[str, dict[str, Settings]]) -> list[Pair]:
             if missing:
                 raise ParameterError(f"{where}: {sorted(missing)[0]} is missing")
             if any(pair.joins(a, b) for pair in pairs):
-                raise ParameterError(f"{where}: this pair stands twice")
+                raise ParameterError(f"{where}: this pair appears twice")
             pairs.append(Pair(a, b, **values))
     return pairs
 
@@ -334,7 +334,8 @@ def _wall(given: str | None, materials: tuple[Material, ...], bodies: tuple[Body
     free = [name for name in names if name not in {body.material for body in bodies}]
     wall = given if given is not None or len(free) != 1 else free[0]
     if wall not in names:
-        raise ParameterError(f"wall: {wall!r} names no material for funnel and plate; known: {', '.join(names)}")
+        found = "missing" if wall is None else f"{wall!r} is not a material"
+        raise ParameterError(f"wall: {found}; allowed for funnel and plate: {', '.join(names)}")
     return str(wall)
 
 
@@ -348,8 +349,8 @@ def _body(entry: Settings, materials: tuple[Material, ...], path: Path) -> Body:
     by_spheres = bool(table.sphere_centres)
     foreign = table.model_fields_set & set(("shape", "spheres") if by_spheres else SPHERES_BY_HAND)
     if foreign:
-        kind = "by their spheres" if by_spheres else "by their solid"
-        raise ParameterError(f"{where}.{min(foreign)}: unknown key for bodies {kind}")
+        kind = "by its spheres" if by_spheres else "by its solid"
+        raise ParameterError(f"{where}.{min(foreign)}: not allowed for a body declared {kind}")
     names = {material.name: material for material in materials}
     material = names[one_of(table.material or table.name, f"{where}.material", names)]
     if not 0.0 <= table.mass_fraction <= 1.0:
@@ -374,7 +375,7 @@ def _taken_in(entry: Settings, path: Path) -> tuple[Settings, Path]:
         raise ParameterError(f"{own}: a body file holds format = 1 and one [[body]] without `file`")
     for key in entry:
         if key in (*SPHERES_BY_HAND, "shape", "spheres"):
-            raise ParameterError(f"body with file = {entry['file']!r}: {key}: unknown key beside a file")
+            raise ParameterError(f"body with file = {entry['file']!r}: {key}: not allowed together with file")
     return {**file.body[0], **{key: value for key, value in entry.items() if key != "file"}}, own
 
 
@@ -384,20 +385,22 @@ def _sizes(table: BodyTable, body: Body) -> SizeDistribution:
     if table.size is not None:
         if given & {"size_distribution", "size_spread"}:
             raise ParameterError(
-                f"{where}.size: stands beside size_distribution or size_spread; allowed: one of the two"
+                f"{where}.size: given together with size_distribution or size_spread; allowed: one or the other"
             )
         spread = measured_spread(table.size, f"{where}.size")
         return SizeDistribution("log_normal", float(known[f"{where}.size_spread"].check(spread)))
     kind = str(known[f"{where}.size_distribution"].check(table.size_distribution))
     spread = float(known[f"{where}.size_spread"].check(table.size_spread))
     if spread > 0.0 and "size_distribution" not in given:
-        raise ParameterError(f"{where}.size_spread: needs size_distribution beside it (uniform or log_normal)")
+        raise ParameterError(f"{where}.size_spread: needs size_distribution (uniform or log_normal) as well")
     return SizeDistribution(kind, spread)
 
 
 def _solid(table: BodyTable, where: str, path: Path) -> Solid:
     if table.shape is None:
-        raise ParameterError(f"{where}.shape: missing; a solid, or sphere_centres and what belongs to them")
+        raise ParameterError(
+            f"{where}.shape: missing; allowed: a solid, or sphere_centres, sphere_radii, mass and inertia"
+        )
     return Solid.from_toml(table.shape, f"{where}.shape", path.parent)
 
 
@@ -429,14 +432,14 @@ def _check_members(body: Body, shape: Members, where: str) -> None:
     volume, moment = 4.0 / 3.0 * math.pi * radius**3, body.mass * radius**2
     if not LIGHTEST * volume <= body.mass <= HEAVIEST * volume:
         raise ParameterError(
-            f"{where}.mass: {body.mass:g} kg, of spheres in a ball of {2.0 * radius:.3g} m; "
+            f"{where}.mass: {body.mass:g} kg for spheres within a diameter of {2.0 * radius:.3g} m; "
             f"allowed: {LIGHTEST * volume:.3g} … {HEAVIEST * volume:.3g} kg"
         )
     inertia = body.clump.inertia
     if not SMALLEST_MOMENT * moment <= inertia.min() <= inertia.max() <= LARGEST_MOMENT * moment:
         raise ParameterError(
-            f"{where}.inertia: {list(shape.inertia)} kg m2, of {body.mass:g} kg in a ball of {2.0 * radius:.3g} m; "
-            f"allowed: {SMALLEST_MOMENT * moment:.3g} … {LARGEST_MOMENT * moment:.3g} kg m2"
+            f"{where}.inertia: {list(shape.inertia)} kg m2 for {body.mass:g} kg within a diameter of "
+            f"{2.0 * radius:.3g} m; allowed: {SMALLEST_MOMENT * moment:.3g} … {LARGEST_MOMENT * moment:.3g} kg m2"
         )
 
 
@@ -459,7 +462,9 @@ def _percent(name: str, where: str) -> float:
     match = QUANTILE.fullmatch(name)
     percent = float(match[1]) if match else 0.0
     if not 0.0 < percent < 100.0:
-        raise ParameterError(f"{where}.quantiles.{name}: not a quantile; allowed: p01 … p99")
+        raise ParameterError(
+            f"{where}.quantiles.{name}: not a quantile; allowed: p and a percentage above 0 and below 100, as in p05"
+        )
     return percent
 
 

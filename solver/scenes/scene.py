@@ -214,17 +214,19 @@ def check(scene: Scene) -> None:
         rig = pour_rig(scene)
         if rig.domain_half_width <= (opening := rig.feed().half_width):
             raise ParameterError(
-                f"rig.domain_half_width: {rig.domain_half_width:g} m ends within the feed opening; allowed: more than "
+                f"rig.domain_half_width: {rig.domain_half_width:g} m lies within the feed opening; allowed: more than "
                 f"{opening:g} m"
             )
         if scene.insertion.protocol not in rig.protocols:
             allowed = ", ".join(rig.protocols)
-            raise ParameterError(f"insertion.protocol: {scene.insertion.protocol!r} is not {allowed} in a {rig.name}")
+            raise ParameterError(
+                f"insertion.protocol: {scene.insertion.protocol!r}; allowed in the rig {rig.name}: {allowed}"
+            )
         longest = max(max(body.largest_extents) for body in scene.bodies)
         if rig.running_time is not None and rig.running_time >= scene.numerics.max_time:
             raise ParameterError(
-                f"numerics.max_time: {scene.numerics.max_time:g} s end before the {rig.name} has run for its "
-                f"{rig.running_time:g} s; turn faster, or fewer times"
+                f"numerics.max_time: {scene.numerics.max_time:g} s is not longer than the {rig.running_time:g} s for "
+                f"which the {rig.name} runs; raise it, turn faster, or turn fewer times"
             )
         _check_duration(rig, scene.numerics)
         rig.feed().check(scene.insertion.region_radius, longest)
@@ -235,7 +237,7 @@ def _check_gravity(scene: Scene) -> None:
     in_rig = scene.rig.name in RIGS or scene.rig.name in BENCH_RIGS
     if in_rig and not (scene.gravity[2] < 0.0 and math.hypot(*scene.gravity) <= MOST_GRAVITY):
         raise ParameterError(
-            f"gravity: {list(scene.gravity)} m/s2; allowed: down (third number below 0), up to {MOST_GRAVITY:g} m/s2"
+            f"gravity: {list(scene.gravity)} m/s2; allowed: third number below 0, magnitude up to {MOST_GRAVITY:g} m/s2"
         )
 
 
@@ -287,7 +289,9 @@ def _body(scene: Scene, name: str) -> Body:
 
 def _check_duration(rig: PourRig, numerics: Numerics) -> None:
     if numerics.duration > 0.0 and rig.running_time is not None:
-        raise ParameterError(f"numerics.duration: {numerics.duration:g} s in a {rig.name}, which runs for its own time")
+        raise ParameterError(
+            f"numerics.duration: {numerics.duration:g} s; allowed in the rig {rig.name}, which sets its own time: 0"
+        )
     if numerics.duration > numerics.max_time:
         raise ParameterError(
             f"numerics.duration: {numerics.duration:g} s is beyond numerics.max_time; "

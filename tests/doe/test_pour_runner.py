@@ -178,7 +178,7 @@ def test_a_mesh_that_is_changed_while_it_is_poured_ends_the_study(tmp_path):
         yield queue.popleft(), record_of(empty_pile(), np.zeros(1), np.zeros(1), poured_mass=1.0)
 
     with closing(Store(tmp_path / "runs.sqlite")) as store:
-        with pytest.raises(StoreError, match="stage, good: a mesh file was changed while it was poured; begin again"):
+        with pytest.raises(StoreError, match="stage, good: a mesh file changed during the pour; start again"):
             PourRunner(scene, store, "test", 1, pours=changed).run("stage", [Setting("good", {}, 1)])
         assert list(store.runs()) == []
 

@@ -110,7 +110,7 @@ def test_a_raw_pour_that_is_damaged_is_one_clear_line(store):
 def test_a_store_of_an_older_physics_stays_readable_and_nothing_is_poured_into_it(tmp_path, store, monkeypatch):
     monkeypatch.setattr(module, "PHYSICS", PHYSICS + 1)
     store.close()
-    with pytest.raises(StoreError, match=rf"runs\.sqlite: a store of physics {PHYSICS}, and .* physics {PHYSICS + 1};"):
+    with pytest.raises(StoreError, match=rf"runs\.sqlite: a store of physics {PHYSICS}, but .* physics {PHYSICS + 1};"):
         Store(tmp_path / "runs.sqlite")
     with closing(Store(tmp_path / "runs.sqlite", pouring=False)) as old:
         assert old.version.startswith(f"old, of physics {PHYSICS}; this program pours by physics {PHYSICS + 1}")
@@ -194,7 +194,7 @@ def test_another_program_s_database_is_left_alone(tmp_path):
         database.execute("CREATE TABLE pictures (name TEXT)")
     before = path.read_bytes()
     for pouring in (True, False):
-        with pytest.raises(StoreError, match=r"photos\.sqlite: is the database of another program .*'pictures'"):
+        with pytest.raises(StoreError, match=r"photos\.sqlite: a database of another program .*'pictures'"):
             Store(path, pouring=pouring)
     assert path.read_bytes() == before
 

@@ -103,8 +103,8 @@ def test_an_empty_file_becomes_a_store(tmp_path):
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ("DELETE FROM store", "does not say of which physics it is"),
-        ("UPDATE store SET physics = 'two'", "does not say of which physics it is"),
+        ("DELETE FROM store", "its version of the physics is missing"),
+        ("UPDATE store SET physics = 'two'", "its version of the physics is missing"),
         ("UPDATE pours SET observables = '[]'", "run k1: its parameters, outcome, readings or raw pour cannot be read"),
         (
             "UPDATE pours SET parameters = 'null'",

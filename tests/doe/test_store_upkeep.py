@@ -111,7 +111,7 @@ def test_a_pour_that_took_another_time_elsewhere_is_the_same(tmp_path, ours):
 def test_the_same_pour_with_other_bits_is_refused_and_nothing_is_added(tmp_path, ours):
     later = packed(dataclasses.replace(unpacked(RUN.raw), gate_opened=9.0))
     theirs = store_of(tmp_path / "theirs.sqlite", another(raw=later), another(key="k3"))
-    with pytest.raises(StoreError, match="run k1 is another pour there"):
+    with pytest.raises(StoreError, match="run k1 differs from the run with the same key"):
         store_upkeep.merge(ours, theirs)
     assert keys(ours) == ["k1", "k2"]
 
@@ -120,9 +120,9 @@ def test_pours_of_two_physics_do_not_go_together(tmp_path, ours):
     theirs = store_of(tmp_path / "theirs.sqlite", another(key="k3"))
     with closing(sqlite3.connect(theirs)) as db, db:
         db.execute("UPDATE store SET physics = ?", (PHYSICS + 1,))
-    with pytest.raises(StoreError, match=f"physics {PHYSICS + 1}, .* of physics {PHYSICS}"):
+    with pytest.raises(StoreError, match=f"physics {PHYSICS + 1}, but .* has physics {PHYSICS}"):
         store_upkeep.merge(ours, theirs)
-    with pytest.raises(StoreError, match="is the store that it is to be merged into"):
+    with pytest.raises(StoreError, match="is the store to merge into"):
         store_upkeep.merge(ours, ours)
 
 

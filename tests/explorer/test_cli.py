@@ -52,7 +52,7 @@ AT = "tcp://127.0.0.1:9"
         (["funnel", "--set", "rig.mass=nan"], ["rig.mass", "'nan'"]),
         (["funnel", "--set", "rig.mass=1e999"], ["rig.mass", "finite"]),
         (["funnel", "--set", "rig.outlet_height=2.5inch"], ["rig.outlet_height", "inch", "mm"]),
-        (["funnel", "--set", "rig.outlet_diameter=15mm"], ["rig.outlet_diameter", "narrower than a body"]),
+        (["funnel", "--set", "rig.outlet_diameter=15mm"], ["rig.outlet_diameter", "too narrow for a body"]),
         (["funnel", "--set", "insertion.protocol=throw"], ["insertion.protocol", "pour_through, fill_then_open"]),
         (["funnel", "--set", "rig.mass"], ["rig.mass", "path=value"]),
         (["cone"], ["cone", "funnel", "sunflower_extract"]),

@@ -273,8 +273,8 @@ def test_what_is_in_the_store_is_not_poured_again(swept, scene, monkeypatch):
         ({}, {"seeds": [np.inf]}, "seed inf: allowed: a whole number from 0 on"),
         ({}, {"seeds": [2**63]}, "seed 9223372036854775808: allowed: a whole number from 0 on, below"),
         ({"rig.mass": []}, {}, "rig.mass: no values"),
-        ({}, {"workers": 0}, "workers 0: allowed: a whole number from 1 on"),
-        ({}, {"workers": -1}, "workers -1: allowed: a whole number from 1 on"),
+        ({}, {"workers": 0}, "workers 0: allowed: a whole number of at least 1"),
+        ({}, {"workers": -1}, "workers -1: allowed: a whole number of at least 1"),
     ],
 )
 def test_a_sweep_is_refused_before_anything_is_poured(scene, tmp_path, values, options, told):

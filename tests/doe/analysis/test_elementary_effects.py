@@ -106,7 +106,7 @@ def test_a_lost_run_takes_the_two_steps_beside_it(design):
 
 
 def test_a_design_without_steps_of_one_factor_is_refused_and_runs_come_in_whole_trajectories():
-    with pytest.raises(StatisticsError, match="no Morris design"):
+    with pytest.raises(StatisticsError, match="as in a Morris design"):
         elementary_effects(np.array([[-1.0, -1], [1, 1], [-1, -1]]), np.zeros((3, 1)), "AB")
     assert len(DESIGNS["morris"].points(5, DesignOptions()).coded) == 60
     assert len(DESIGNS["morris"].points(5, DesignOptions(runs=24)).coded) == 24

@@ -122,9 +122,11 @@ def test_the_order_is_the_highest_that_the_runs_bear(blends, order):
 
 
 def test_too_few_runs_and_too_many_blends_are_refused():
-    with pytest.raises(StatisticsError, match="3 valid runs cannot bear the 3 terms of the linear polynomial"):
+    with pytest.raises(
+        StatisticsError, match="3 valid runs are too few for the 3 terms of the linear mixture polynomial"
+    ):
         fit_mixture(np.eye(3), np.ones((3, 1)), NONE, "ABC")
-    with pytest.raises(StatisticsError, match="no room"):
+    with pytest.raises(StatisticsError, match="no range is left"):
         fit_mixture(BLENDS, ELONGATION, np.full(3, 0.5), "ABC")
     with pytest.raises(StatisticsError, match="up to 20000"):
         simplex_lattice(12, 8)

@@ -108,7 +108,7 @@ def test_highest_order_keeps_an_error():
 def test_terms_get_what_they_stand_on():
     assert hierarchical("ABC", ["A*C", "B^2"]) == ("A", "B", "C", "A*C", "B^2")
     assert hierarchical("ABC", ["C"]) == ("C",)
-    with pytest.raises(StatisticsError, match="no term of the model"):
+    with pytest.raises(StatisticsError, match="not a term of the model"):
         hierarchical("ABC", ["A*Z"])
 
 

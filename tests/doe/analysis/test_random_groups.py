@@ -222,11 +222,11 @@ def test_means_of_names_have_the_error_of_their_own_contrast():
 def test_what_cannot_be_answered_is_refused():
     coded, y, plot = split_plot(0, plots=2)
     with pytest.raises(
-        StatisticsError, match="8 valid runs in 2 groups do not tell A from one another and from the groups"
+        StatisticsError, match="8 valid runs in 2 groups are too few to separate A from one another and from the groups"
     ):
         fit_random(coded, y[:, None], region("AB"), TWO, blocks_of(plot), terms=("A",))
     coded, y, plot = split_plot(0)
-    with pytest.raises(StatisticsError, match="no scatter"):
+    with pytest.raises(StatisticsError, match="without scatter"):
         fit_random(coded, (coded @ [1.0, 2])[:, None], region("AB"), TWO, blocks_of(plot), "linear")
     with pytest.raises(CommandError, match="--target: is not for --random plot; allowed: --block plot"):
         analysed("oats", response="Y", random="plot", target=100.0)

@@ -147,8 +147,20 @@ def test_missing_rows_that_mix_up_the_factors_are_refused(missing):
     """
     values = planted({}, 1.0, 2)
     values[missing] = np.nan
-    with pytest.raises(StatisticsError, match=rf"without rows .* the {28 - len(missing)} others cannot separate"):
+    found = (
+        rf"without rows 2, .* the {28 - len(missing)} valid rows cannot separate 24 factors .* repeat one, or declare"
+    )
+    with pytest.raises(StatisticsError, match=found):
         screen(values, DUMMIES)
+
+
+def test_factors_that_the_design_itself_mixes_up_are_refused():
+    design = np.column_stack([DESIGN[:, :2], DESIGN[:, 1]])
+    found = (
+        r"^responses: the 28 valid rows cannot separate 3 factors and the mean; declare an untestable factor a dummy$"
+    )
+    with pytest.raises(StatisticsError, match=found):
+        analyse_screening(design, ["X1", "X2", "X3"], np.arange(28.0)[:, None], [])
 
 
 def test_an_untestable_factor_may_serve_as_a_dummy():
@@ -249,7 +261,7 @@ def test_selection_refuses_a_short_fallback_and_unknown_names():
     screening = screen(np.full((28, 2), 24.0), DUMMIES)
     with pytest.raises(StatisticsError, match="leaves 2 of 4 factors"):
         select_factors(screening, 4, fallback=["X4", "X7"])
-    with pytest.raises(StatisticsError, match="'D1' is no factor"):
+    with pytest.raises(StatisticsError, match="'D1' is not a factor"):
         select_factors(screening, 3, fallback=["D1"])
 
 

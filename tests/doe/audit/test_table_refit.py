@@ -158,7 +158,7 @@ def test_a_table_without_a_line_that_the_fit_has_still_names_its_model():
     assert len(audit.having("reproduced exactly")) == len(audit.figures) > 20
     bare = tuple(replace(line, df=None) for line in anova if line.source in ORDER)
     (figure,) = audit_study(study(bare, y, 12)).having("cannot be checked")
-    assert "no degrees of freedom say whether the model has more terms" in figure.how
+    assert "lacks the degrees of freedom that tell whether the model has more terms" in figure.how
 
 
 def test_axial_points_printed_with_few_digits_are_those_of_the_design():

@@ -36,7 +36,7 @@ def test_every_condition_has_the_effect_and_its_amplitude_is_calibrated(measurem
 def test_a_given_effect_is_no_candidate_and_is_given_once(measurement):
     found = with_given(measurement, {"density_error": (0.2,)})
     assert [one.name for one in declare(found, ("density_error", "air_drag")).effects] == ["air_drag"]
-    with pytest.raises(MeasurementError, match=r"effect\.density_error\.excess is one of its parameters"):
+    with pytest.raises(MeasurementError, match=r"effect\.density_error\.excess is already one of its parameters"):
         with_given(found, {"density_error": (0.2,)})
 
 
@@ -79,5 +79,5 @@ def test_what_the_rigs_cannot_have_is_neither_given_nor_asked_beside_it():
 
 def test_next_to_nothing_cannot_be_given(measurement):
     for amplitude in ((0.0,), (1e-17,)):
-        with pytest.raises(MeasurementError, match=r"density_error: an amplitude of .* is none that can be given"):
+        with pytest.raises(MeasurementError, match=r"density_error: an amplitude of .* is too small; allowed"):
             with_given(measurement, {"density_error": amplitude})

@@ -64,7 +64,7 @@ def test_no_other_generators_lose_fewer_interactions(factors, q):
 
 
 def test_more_blocks_than_products_are_refused_with_what_there_is():
-    with pytest.raises(StatisticsError, match=r"blocks = 3: cannot be told from main effects .* allowed: 2, 4, 8"):
+    with pytest.raises(StatisticsError, match=r"blocks = 3: would be aliased with main effects .* allowed: 2, 4, 8"):
         factorial_blocks(4, (), 3)
     with pytest.raises(StatisticsError, match="allowed: no blocks"):
         factorial_blocks(7, standard_generators(7, 4), 2)
@@ -122,11 +122,16 @@ def test_a_shift_of_a_whole_block_moves_no_coefficient(name, factors, blocks):
 @pytest.mark.parametrize(
     "name, factors, options, message",
     [
-        ("box-behnken", 3, {"blocks": 2}, "3 factors; there are none that are orthogonal"),
-        ("box-behnken", 4, {"blocks": 2}, "4 factors; allowed: 3"),
-        ("central-composite", 3, {"blocks": 4}, r"3 factors; allowed: 2, 3 \(the last one"),
-        ("central-composite", 7, {"blocks": 4}, "allowed: 2, 3, 5, 9"),
-        ("central-composite", 3, {"blocks": 2, "alpha": "face-centred"}, "is given by the blocks; allowed: rotatable"),
+        (
+            "box-behnken",
+            3,
+            {"blocks": 2},
+            "allowed: none, as no number of blocks is orthogonal for a Box–Behnken design of 3 factors",
+        ),
+        ("box-behnken", 4, {"blocks": 2}, "allowed: 3 for a Box–Behnken design of 4 factors"),
+        ("central-composite", 3, {"blocks": 4}, r"design of 3 factors: 2, 3 \(the last block"),
+        ("central-composite", 7, {"blocks": 4}, "design of 7 factors: 2, 3, 5, 9"),
+        ("central-composite", 3, {"blocks": 2, "alpha": "face-centred"}, "blocks set the axial distance"),
         ("central-composite", 3, {"blocks": 2, "centre": 0}, "at least one centre run"),
         ("central-composite", 9, {"blocks": 2}, "made for 2 to 7 factors"),
     ],

@@ -213,7 +213,7 @@ def test_a_size_takes_the_fraction_of_least_aberration():
     [
         ({"runs": 24}, "runs = 24: no listed factorial of 9 factors; allowed: 16, 32, 64, 256, 512"),
         ({"runs": 8}, "allowed: 16, 32"),
-        ({"runs": 32, "fraction": 4}, "runs: has generators of its own; allowed: runs or fraction"),
+        ({"runs": 32, "fraction": 4}, "runs: given together with fraction; allowed: one of the two"),
         ({"fraction": 2}, r"no listed fraction 2\^\(9-2\); listed: 9-1 \(256 runs\), 9-3 \(64 runs\)"),
     ],
 )
@@ -225,11 +225,11 @@ def test_a_size_that_is_not_listed_is_refused_with_what_is(options, message):
 @pytest.mark.parametrize(
     "generators, message",
     [
-        (["D"], "form such as"),
+        (["D"], "allowed: the form"),
         (["D=AX"], "no factor X"),
-        (["D=AD"], "different other factors"),
-        (["D=AA"], "different other factors"),
-        (["D=A"], "different other factors"),
+        (["D=AD"], "two or more other factors, each once"),
+        (["D=AA"], "two or more other factors, each once"),
+        (["D=A"], "two or more other factors, each once"),
         (["D=ABC", "D=AB"], "must set another factor"),
         (["C=AB", "D=AC"], "must set another factor"),
     ],

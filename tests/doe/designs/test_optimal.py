@@ -157,8 +157,8 @@ def test_the_same_seed_gives_the_same_runs():
     "options, message",
     [
         ({"runs": 5}, "runs = 5: too few for the 6 terms of the quadratic model; allowed: at least 6"),
-        ({"runs": 3, "kept": ((-1.0, 0.0), (1.0, 0.0))}, "beside 2 finished runs, which tell 2 .* at least 4"),
-        ({"constraints": ((1.0, 1.0, -1.99),)}, "leave 0 of 4096 points of low … high; allowed: a wider region"),
+        ({"runs": 3, "kept": ((-1.0, 0.0), (1.0, 0.0))}, "beside 2 finished runs, which determine 2 .* at least 4"),
+        ({"constraints": ((1.0, 1.0, -1.99),)}, "only 0 of 4096 random points between low and high satisfy them"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_told_is_refused(options, message):

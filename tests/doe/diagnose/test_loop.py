@@ -261,7 +261,7 @@ def test_no_more_is_poured_where_the_noise_of_the_data_hides_what_is_between_two
         found = diagnosis.run_diagnosis(fitted, None, None, NAMES, BUDGET, said.append, plan_next=False)
         assert found.verdict.kind.startswith("ambiguous:"), said
         looks[instrument] = sum(line.startswith("after a closer look") for line in said)
-        assert any(line.startswith("no pours tell ") for line in said) == (instrument == 2.0), said
+        assert any(line.startswith("no pours can tell ") for line in said) == (instrument == 2.0), said
     assert looks == {0.05: BUDGET.looks, 2.0: 1}
 
 

@@ -95,9 +95,9 @@ def test_a_target_names_observables_that_there_are(test):
     ("test", "text", "words"),
     [
         ("bulk_density", VESSEL + "s,1,200,250,100,,,\n", ["mass_vessel", "no sample"]),
-        ("bulk_density", VESSEL + "s,1,400,250,100,390,,\n", ["mass_tapped", "looser"]),
-        ("bulk_density", VESSEL + "s,1,400,250,100,,110,\n", ["volume_tapped", "looser"]),
-        ("bulk_density", VESSEL + "s,1,400,250,100,410,95,\n", ["mass_tapped", "beside volume_tapped"]),
+        ("bulk_density", VESSEL + "s,1,400,250,100,390,,\n", ["mass_tapped", "lower density"]),
+        ("bulk_density", VESSEL + "s,1,400,250,100,,110,\n", ["volume_tapped", "lower density"]),
+        ("bulk_density", VESSEL + "s,1,400,250,100,410,95,\n", ["mass_tapped", "together with volume_tapped"]),
         ("bulk_density", VESSEL + "s,1,400,250,100,,90,1600\n", ["particle_density", "above 1667"]),
         ("drum", DRUM + "s,1,30,40,5,200\n", ["lower_angle", "up to it"]),
         ("drum", DRUM + "s,1,40,30,5,\n", ["diameter", "is empty"]),

@@ -89,7 +89,7 @@ def test_the_interval_is_nearly_the_exact_one(c, n):
         ("seed,1,8,9,2\n", ["row 2", "column width", "longest dimension"]),
         ("seed,1,8,4,9\n", ["row 2", "column thickness", "longest dimension"]),
         ("seed,1,8,4,2\nseed,2,8,4,\n", ["row 3", "column thickness", "is empty", "row 2"]),
-        ("seed,1,8,4,\nseed,2,8,4,2\n", ["row 3", "column thickness", "stands alone", "row 2"]),
+        ("seed,1,8,4,\nseed,2,8,4,2\n", ["row 3", "column thickness", "is given", "row 2"]),
         ("seed,1,8,,2\n", ["row 2", "column width_mm", "above 0"]),
         ("seed,1,8,4,0\n", ["row 2", "column thickness_mm", "above 0"]),
         ("seed,1,8,4,2\nseed,1,8,4,2\n", ["row 3", "column replicate", "row 2"]),

@@ -105,7 +105,7 @@ def test_noise_is_that_of_a_point():
     [
         (np.linspace(0, 1, 5), np.linspace(0, 1, 5), "5 points"),
         (np.linspace(0, 1, 20), -np.linspace(0, 1, 20) - 1.0, "1 points"),
-        (np.linspace(0, 1, 9), np.linspace(0, 1, 10), "as many"),
+        (np.linspace(0, 1, 9), np.linspace(0, 1, 10), "equal numbers"),
         (np.linspace(0, 1, 12), np.exp(20.0 * np.linspace(0, 1, 12)), "no straight part"),
         ([], [], "0 points"),
     ],

@@ -74,7 +74,7 @@ def test_an_error_as_large_as_a_reading_above_nought_is_refused(test, head, row,
     path = written(tmp_path, f"{head}\n{row}\n")
     with pytest.raises(LaboratoryError) as caught:
         analyse(test, path)
-    assert_one_line(caught.value, path, ["row 2", "column drop_height_error_", "allowed: below the reading beside it"])
+    assert_one_line(caught.value, path, ["row 2", "column drop_height_error_", "keeps the reading within"])
 
 
 def test_an_error_may_take_a_reading_to_nought_where_nought_is_allowed(tmp_path):

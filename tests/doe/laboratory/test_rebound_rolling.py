@@ -97,10 +97,10 @@ def test_several_pairs_give_no_parameter_that_there_is_one_of(tmp_path):
         ("rebound", REBOUND + "s,w,1,300,310,\n", ["row 2", "rebound_height", "up to it"]),
         ("rebound", REBOUND + "s,w,1,300,,\n", ["row 2", "rebound_height", "is empty"]),
         ("rebound", REBOUND + "s,w,1,,120,\n", ["row 2", "drop_height", "is empty"]),
-        ("rebound", REBOUND + "s,w,1,300,120,0.6\n", ["row 2", "restitution", "beside drop_height"]),
+        ("rebound", REBOUND + "s,w,1,300,120,0.6\n", ["row 2", "restitution", "together with drop_height"]),
         ("rebound", REBOUND + "s,w,1,,,1.2\n", ["row 2", "restitution", "below 1"]),
         ("rolling", ROLLING + "s,w,1,,10,\n", ["row 2", "stopping_distance", "is empty"]),
-        ("rolling", ROLLING + "s,w,1,2,10,500\n", ["row 2", "angle", "beside release_height"]),
+        ("rolling", ROLLING + "s,w,1,2,10,500\n", ["row 2", "angle", "together with release_height"]),
         ("rolling", ROLLING + "s,w,1,95,,\n", ["row 2", "angle_deg", "below 90 deg"]),
     ],
 )

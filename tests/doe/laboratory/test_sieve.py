@@ -142,7 +142,7 @@ def test_what_coarse_stacks_read_of_a_spread_is_in_the_table_of_biases():
     [
         ("s,1,2,50,\ns,1,1,50,\n", ["row 2", "aperture", "no pan"]),
         ("s,1,2,50,\ns,1,0,50,\n", ["row 2", "1 sieve"]),
-        ("s,1,2,50,\ns,1,2,50,\ns,1,0,1,\n", ["row 3", "row 2", "every sieve once"]),
+        ("s,1,2,50,\ns,1,2,50,\ns,1,0,1,\n", ["row 3", "row 2", "each sieve once"]),
         ("s,1,2,0,\ns,1,1,0,\ns,1,0,0,\n", ["row 2", "weighs nothing"]),
         ("s,1,2,5,11\ns,1,1,5,12\ns,1,0,1,\n", ["row 3", "mass_total", "one number"]),
         ("s,1,2,-5,\ns,1,1,5,\ns,1,0,1,\n", ["row 2", "mass_retained_g"]),

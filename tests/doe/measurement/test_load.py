@@ -123,7 +123,7 @@ def test_scanned_piles_come_before_the_table(tmp_path):
 def test_a_gap_in_the_replicates_is_refused(tmp_path):
     folder = write(tmp_path)
     write_pile(folder / "piles/slow_4.npz")
-    with pytest.raises(MeasurementError, match=r"slow_4\.npz: replicate 3 is missing of 4"):
+    with pytest.raises(MeasurementError, match=r"slow_4\.npz: replicate 3 of 4 is missing"):
         load_measurement(folder)
 
 

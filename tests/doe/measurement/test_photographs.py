@@ -64,7 +64,10 @@ def test_a_picture_without_a_pile_is_listed_with_its_reason(tmp_path):
         ('[{ file = "a.png", pixel = "-1mm" }]', ["images.pixel", "more than 0"]),
         ('[{ file = "a.png", pixel = "1kg" }]', ["images.pixel", "mm"]),
         ('[{ file = "a.png", base_line = [1] }]', ["images.base_line", "2 numbers"]),
-        ('[{ file = "a.png", replicate = 1 }, { file = "b.png", replicate = 1 }]', ["two of replicate 1"]),
+        (
+            '[{ file = "a.png", replicate = 1 }, { file = "b.png", replicate = 1 }]',
+            ["two photographs of replicate 1 at azimuth 0"],
+        ),
         ('["slow.csv"]', ["slow.csv", "not a picture"]),
     ],
 )

@@ -25,8 +25,8 @@ def refusal(folder):
         ('"material.toml"', '"gold.toml"', ["gold.toml", "neither a file"]),
         ("title =", "titel =", ["titel: unknown key", "title"]),
         ('role = "fit"', 'role = "train"', ["condition 'slow'", "role: 'train'", "fit, holdout"]),
-        ('role = "fit"', 'role = "holdout"', ["condition.role", "at least one fit"]),
-        ('name = "fast"', 'name = "slow"', ["condition.name: 'slow' stands twice"]),
+        ('role = "fit"', 'role = "holdout"', ["condition.role", "at least one is needed"]),
+        ('name = "fast"', 'name = "slow"', ["condition.name: 'slow' appears twice"]),
         ('rig = "funnel"', 'rig = "bucket"', ["condition 'slow'", "'bucket' is not one of funnel"]),
         ('rig = "funnel"', 'rig = "inclined_plane"', ["condition 'slow'", "bench test"]),
         ('role = "fit"', 'role = "fit"\nturned = 180', ["condition 'slow'", "turned: 180", "true or false"]),
@@ -50,7 +50,7 @@ def refusal(folder):
         ("pair.glass.glass.static", "pair.glass.glass.magic", ["parameters.pair.glass.glass.magic_friction: no such"]),
         ("pair.glass.glass.static_friction", "pair.gold.glass.restitution", ["pair.gold.glass: no such pair"]),
         ("{ mean = 0.3, sd = 0.05 }", "{ mean = 0.3 }", ["no range", "low and high, or mean and sd"]),
-        ("{ mean = 0.3, sd = 0.05 }", "{ sd = 0.05, low = 0.1, high = 1 }", ["sd: 0.05", "beside a mean"]),
+        ("{ mean = 0.3, sd = 0.05 }", "{ sd = 0.05, low = 0.1, high = 1 }", ["sd: 0.05", "together with a mean"]),
         ("{ mean = 0.3, sd = 0.05 }", "{ mean = 0.3, low = 0.4, high = 1 }", ["mean: 0.3 is outside 0.4 … 1"]),
         ("{ mean = 0.3, sd = 0.05 }", "{ low = 1.0, high = 0.5 }", ["range 1 … 0.5 is empty"]),
         ("{ mean = 0.3, sd = 0.05 }", '{ mean = "a lot", sd = 1 }', ["mean: 'a lot' is not a number"]),
@@ -74,7 +74,7 @@ def test_a_bad_measurement_file(tmp_path, old, new, words):
         ("20.0", "steep", [":3: value: 'steep'", "a finite number in deg"]),
         ("20.0", "nan", [":3: value: 'nan'"]),
         ("1,angle_of_repose_deg,,", "1,angle_of_repose_deg,0.1,", [":3", "x is '0.1'", "empty x"]),
-        ("discharged_mass_kg,0.5,0.001", "discharged_mass_kg,,0.001", ["a place x in s (it is a curve)"]),
+        ("discharged_mass_kg,0.5,0.001", "discharged_mass_kg,,0.001", ["a coordinate x in s (it is a curve)"]),
         ("1,angle_of_repose_deg,,20.0", "1,angle_of_repose_rad,,0.4", ["'angle_of_repose_rad'", "angle_of_repose_deg"]),
         ("1,angle_of_repose_deg,,20.0", "1,apex_height,,0.4", ["'apex_height'", "missing unit", "apex_height_m"]),
         (
@@ -83,11 +83,11 @@ def test_a_bad_measurement_file(tmp_path, old, new, words):
             ["replicate: 'first'", "whole numbers from 1"],
         ),
         ("1,angle_of_repose_deg,,20.0", "0,angle_of_repose_deg,,20", ["replicate: '0'", "from 1 on"]),
-        ("2,angle_of_repose_deg,,22.0", "4,angle_of_repose_deg,,22.0", ["replicate: 3 is missing of 4"]),
-        ("1,angle_of_repose_deg,,20.0", "2024011510123,angle_of_repose_deg,,20.0", ["3 is missing of 2024011510123"]),
+        ("2,angle_of_repose_deg,,22.0", "4,angle_of_repose_deg,,22.0", ["replicate: 3 of 4 is missing"]),
+        ("1,angle_of_repose_deg,,20.0", "2024011510123,angle_of_repose_deg,,20.0", ["3 of 2024011510123 is missing"]),
         ("20.0", "-94.1", [":3: value: '-94.1'", "allowed: above -90 deg and below 90 deg"]),
         ("1,angle_of_repose_deg,,20.0", "1,angle_of_repose_deg@45,,1e9", [":3: value: '1e9'", "below 90 deg"]),
-        ("2,angle_of_repose_deg,,22.0", "1,angle_of_repose_deg,,22.0", [":4: angle_of_repose_deg", "stands twice"]),
+        ("2,angle_of_repose_deg,,22.0", "1,angle_of_repose_deg,,22.0", [":4: angle_of_repose_deg", "appears twice"]),
         ("2,angle_of_repose_deg,,22.0", "2,apex_height_m,,0.02", ["one replicate has no scatter", "[uncertainty]"]),
     ],
 )
@@ -123,7 +123,9 @@ def test_an_error_in_the_material_names_its_file(tmp_path):
 
 
 def test_a_measurement_without_conditions(tmp_path):
-    assert "at least one fit" in refusal(write(tmp_path, {"measurement.toml": MEASUREMENT.partition("[[")[0]}))
+    assert "has the role fit; at least one" in refusal(
+        write(tmp_path, {"measurement.toml": MEASUREMENT.partition("[[")[0]})
+    )
 
 
 @pytest.mark.parametrize(

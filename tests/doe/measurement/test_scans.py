@@ -178,7 +178,7 @@ def test_files_belong_to_conditions_and_replicates(tmp_path):
     assert {key: sorted(value) for key, value in found.items()} == {"slow": [1, 2], "fast": []}
     assert sorted(path.name for path in strangers) == ["fast_1.doc", "other_1.ply", "slow_0.ply"]
     (folder / "slow_1.xyz").touch()
-    with pytest.raises(MeasurementError, match="replicate 1 has another scan"):
+    with pytest.raises(MeasurementError, match="replicate 1 has more than one scan"):
         scan_files(tmp_path, ["slow"])
 
 
@@ -219,7 +219,7 @@ def test_commas_divide_the_cells_of_a_row_with_blanks_in_its_last_one(tmp_path, 
     [
         ("scan.xyz", b"\0\0", "not a text file"),
         ("scan.ply", b"no surface", "cannot be read"),
-        ("scan.xyz", b"1 2 3\n", "1 points that are finite; allowed: 200"),
+        ("scan.xyz", b"1 2 3\n", "1 finite points; allowed: 200"),
         ("scan.csv", b"x,y,z\na,b,c\n", "no table of x, y, z"),
         ("scan.npz", b"PK", "cannot be read as"),
         ("scan.tif", b"II*", "cannot be read as an image"),
@@ -237,7 +237,7 @@ def test_a_file_that_is_none_is_refused_in_one_line(tmp_path, name, content, lin
 def test_a_scan_without_a_bare_plate_asks_for_the_plane():
     rng = np.random.default_rng(0)
     steep = np.column_stack([rng.random((5000, 2)) * 0.1, rng.random(5000) * 0.1])
-    with pytest.raises(MeasurementError, match="no bare plate is seen"):
+    with pytest.raises(MeasurementError, match="no bare plate found"):
         found_plate(steep)
 
 

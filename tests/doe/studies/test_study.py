@@ -69,7 +69,7 @@ def test_bodies_touched_by_a_factor(path, bodies):
         (lambda t: t["factor"][3].update(reference="1MPa"), "reference"),
         (lambda t: t["factor"][3].update(path="material.seed.colour"), "no such parameter"),
         (lambda t: t["factor"][3].pop("high"), r"factor\.high: missing in X4"),
-        (lambda t: t["factor"][3].update(name="X5"), "stands twice"),
+        (lambda t: t["factor"][3].update(name="X5"), "appears twice"),
         (lambda t: t.update(factor=t["factor"][:2]), "factor: 2 factors; at least 3"),
         (lambda t: t.update(fallback=["X4", "X99", "X7"]), "X99"),
         (lambda t: t.update(fallback=["X4"]), "at least 3"),
@@ -107,7 +107,7 @@ def test_bodies_touched_by_a_factor(path, bodies):
         (lambda t: t.update(factor={"name": "X1"}), r"factor: .*; allowed: a list of tables \[\[factor\]\]"),
         (
             lambda t: t["factor"][3].update(path=t["factor"][4]["path"], low=25e6, high=45e6, reference=35e6),
-            r"factor\.path: 'material\.plate\.shear_modulus' stands twice",
+            r"factor\.path: 'material\.plate\.shear_modulus' appears twice",
         ),
         (
             lambda t: t["factor"][3].update(path="body.spheres", low="coarse", high="fine", reference="fine"),
@@ -118,7 +118,7 @@ def test_bodies_touched_by_a_factor(path, bodies):
         (lambda t: t["change"][0].pop("values"), r"change\.values: missing"),
         (lambda t: t["change"][0].update(values=3), "values: 3; allowed: a table"),
         (lambda t: t["change"][0].update(values={}), "changes nothing"),
-        (lambda t: t["change"][1].update(name=t["change"][0]["name"]), r"change\.name: .* stands twice"),
+        (lambda t: t["change"][1].update(name=t["change"][0]["name"]), r"change\.name: .* appears twice"),
         (lambda t: t["scan"].pop("path"), r"scan\.path: missing"),
         (lambda t: t["scan"].pop("values"), r"scan\.values: missing"),
         (lambda t: t["scan"].update(path="body.spheres", values=["coarse"]), "a list of numbers"),

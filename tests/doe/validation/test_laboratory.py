@@ -138,4 +138,4 @@ def test_a_set_is_there_once_it_is_judged_by_every_kind_of_data(tmp_path):
         )
         append_rows(tmp_path / SETS, [found])
         run_campaign(order, said.append)
-    assert [line.partition(": ")[2] for line in said] == ["0 of 1 data sets are there", "1 of 1 data sets are there"]
+    assert [line.partition(": ")[2] for line in said] == ["0 of 1 data sets are done", "1 of 1 data sets are done"]

@@ -311,7 +311,7 @@ def test_a_morris_design_tells_elementary_effects(tmp_path, process):
     assert "one step of one factor" in (tmp_path / "found/report.md").read_text(encoding="utf-8")
     assert analysed(path, "--model", "linear")["analysis"]["model"] is not None
     order = ("design", "morris", "--factors", process, "--runs", 10, "--out", tmp_path / "x.csv")
-    assert "trajectories of 2 factors have 3 runs; allowed: 9, 12" in refused(explorer(*order))
+    assert "trajectory of 2 factors has 3 runs; allowed: 9, 12" in refused(explorer(*order))
 
 
 def test_days_drawn_at_random_are_a_variance_component(tmp_path, process):
@@ -368,7 +368,7 @@ def test_a_process_is_set_beside_the_polynomial_and_answers_the_target(tmp_path,
         (("--constraint", "2* <= time"), "cannot read '*'"),
         (("--constraint", "3 <= 4"), "names no factor"),
         (("--constraint", "solvent <= 1"), "solvent is no number"),
-        (("--constraint", "time + temperature <= 20"), "allowed: a wider region"),
+        (("--constraint", "time + temperature <= 20"), "satisfy them; allowed: at least"),
         (("--runs", 5), "runs = 5: too few for the 9 terms of the quadratic model; allowed: at least 9"),
         (("--augment", "nowhere.csv"), "nowhere.csv"),
     ],

@@ -69,7 +69,7 @@ def test_a_reference_of_another_physics_is_refused(model, tmp_path):
     save(made_up(model, physics=PHYSICS - 1), path)
     result = explorer("limit", "--reference", path, "--out", tmp_path / "limit.json")
     assert result.exit_code == 2
-    assert f"{path}: physics {PHYSICS - 1} is not that of today" in " ".join(result.output.split())
+    assert f"{path}: physics {PHYSICS - 1} is out of date" in " ".join(result.output.split())
     assert not (tmp_path / "limit.json").exists()
 
 

@@ -126,7 +126,7 @@ def test_data_that_are_not_there_are_refused_before_a_start(tmp_path):
         (Question("trefoil_1", ("drag",)), "effects: 'drag' is not one of rolling_resistance"),
         (
             Question("trefoil_1", budget=20),
-            "budget: 20 pours; 23 directions of effects in 1 fitted conditions take at least 58",
+            "budget: 20 pours; allowed: at least 58 for 23 directions of effects in 1 fitted conditions",
         ),
     ],
 )

@@ -117,4 +117,4 @@ def test_a_time_that_no_pour_has_is_refused_by_its_own_name(time, tmp_path):
 
 def test_a_time_that_the_rig_cannot_have_names_the_option(tmp_path):
     line = refused(explorer("export", "rotating_drum", tmp_path / "new", "--to", "paraview", "--time", 1))
-    assert line.startswith("--time 1: numerics.max_time: 1 s end before the rotating_drum has run")
+    assert line.startswith("--time 1: numerics.max_time: 1 s is not longer than the")

@@ -84,9 +84,9 @@ def test_a_mesh_becomes_the_funnel_with_the_feed_drawn_in_and_the_rest_as_it_was
 @pytest.mark.parametrize(
     ("name", "content", "unit", "words"),
     [
-        ("box.stl", stl((80.0, 80.0, 60.0)), None, "stands across the axis"),
-        ("narrow.stl", exported(cone(outlet=4.0, inlet=90.0)), None, "narrower than a body"),
-        ("small.stl", exported(cone()), "um", "Is its unit um"),
+        ("box.stl", stl((80.0, 80.0, 60.0)), None, "blocks the axis"),
+        ("narrow.stl", exported(cone(outlet=4.0, inlet=90.0)), None, "too narrow for a body"),
+        ("small.stl", exported(cone()), "um", "Is rig.unit = 'um' right"),
         ("large.stl", exported(cone()), "cm", "beyond rig.domain_half_width"),
         ("flat.stl", exported(trimesh.creation.annulus(10.0, 40.0, 1e-9)), None, "no height|no triangle|lets .* pass"),
         ("noise.stl", bytes(range(256)) * 9, None, "noise.stl"),

@@ -273,6 +273,6 @@ def test_what_is_refused_is_an_event_and_changes_nothing(live):
     live.pour.obey(MovePlate(Tap(1e-3, 0.02)))
     live.pour.obey(SetPull(Pull(999, (0.0, 0.0, 0.1))))
     texts = [event.text for event in events(live)]
-    assert texts[0] == "refused: the plate moves already; wait until it stands"
-    assert texts[1].startswith("refused: pull: there is no body no. 1000; ")
+    assert texts[0] == "refused: the plate is already moving; wait until it stops"
+    assert texts[1].startswith("refused: pull: there is no body 1000; ")
     assert live.pour.status().disturbance == str(SHAKE)

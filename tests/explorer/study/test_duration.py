@@ -123,5 +123,5 @@ def test_an_export_tells_a_large_pour_before_it_pours(tmp_path, monkeypatch):
 def test_a_pour_of_too_many_bodies_is_refused_before_room_is_made_for_it():
     grain = replace(STUDY.scene.bodies[0], shape=Solid("sphere", (2e-4,)), mass_fraction=1.0)
     scene = with_values(replace(STUDY.scene, bodies=(grain,)), {"rig.mass": 5.0})
-    with pytest.raises(ParameterError, match=rf"5 kg are \d+ bodies; a pour holds at most {MOST_BODIES}"):
+    with pytest.raises(ParameterError, match=rf"5 kg is \d+ bodies; allowed: up to {MOST_BODIES} in a pour"):
         sizes_for([scene], 1)

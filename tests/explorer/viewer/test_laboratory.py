@@ -163,7 +163,7 @@ def test_a_design_asks_for_what_it_takes(design):
         assert " ".join(kind.doc.split()) in design.text
     design.enter("Design", "box-behnken")
     design.enter("Blocks", "2")
-    assert "3 factors; there are none that are orthogonal" in design.press("Make the sheet")
+    assert "allowed: none, as no number of blocks is orthogonal" in design.press("Make the sheet")
 
 
 @pytest.mark.parametrize(

@@ -163,5 +163,5 @@ def test_a_mesh_becomes_the_funnel_and_a_bad_one_changes_nothing(bench):
     assert (bench.session.now.seed, bench.session.now.scene.rig.name) == (5, "mesh_funnel")
     assert bench.shown("Rig", "Material") == ("mesh_funnel", OWN)
     before = (list(bench.session.asked), bench.session.now)
-    assert "narrower than a body" in bench.person.upload(FUNNEL, "narrow.stl", exported(cone(outlet=4.0)))
+    assert "too narrow for a body" in bench.person.upload(FUNNEL, "narrow.stl", exported(cone(outlet=4.0)))
     assert (bench.session.asked, bench.session.now) == before

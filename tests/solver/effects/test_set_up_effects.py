@@ -94,7 +94,9 @@ def test_sizes_scatter_in_squares_beside_the_declared_ones_and_their_mean_stays(
     assert (seed.kind, seed.spread) == ("uniform", pytest.approx(0.5))
     assert (plate.kind, plate.spread) == ("log_normal", pytest.approx(0.4))
     assert poured_mass(after) == pytest.approx(poured_mass(SCENE))
-    with pytest.raises(ParameterError, match=r"size_dispersion\.spread: 0\.4 beside the declared 0\.4 makes 0\.566"):
+    with pytest.raises(
+        ParameterError, match=r"size_dispersion\.spread: 0\.4 and the declared size_spread 0\.4 combine to 0\.566"
+    ):
         with_values(
             SCENE,
             {

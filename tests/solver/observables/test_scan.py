@@ -62,7 +62,7 @@ def test_weights_of_a_triangle_by_hand():
 
 
 def test_a_centre_of_mass_beside_all_spheres_is_refused():
-    with pytest.raises(ParameterError, match="sphere_centres: the centre of mass does not follow"):
+    with pytest.raises(ParameterError, match="sphere_centres: the centre of mass cannot be computed"):
         centre_weights(np.array([[-1.0, 0.5, 0.0], [1.0, 0.5, 0.0]]), 1.0)
 
 
@@ -72,9 +72,9 @@ def test_what_is_refused():
         scanned_pile(SEEDS, xyz[:-1], radius, body)
     with pytest.raises(ParameterError, match="spheres in body 4; allowed"):
         scanned_pile(SEEDS, xyz[:-1], radius[:-1], body[:-1])
-    with pytest.raises(ParameterError, match="not finite or a radius not positive"):
+    with pytest.raises(ParameterError, match="not finite, or a radius is not positive"):
         scanned_pile(SEEDS, xyz, -radius, body)
     with pytest.raises(ParameterError, match="whole numbers"):
         scanned_pile(SEEDS, xyz, radius, body.astype(float))
-    with pytest.raises(ParameterError, match="which of seed, plate, petiole a body is"):
+    with pytest.raises(ParameterError, match="a scan does not tell seed, plate, petiole apart"):
         scanned_pile(SUNFLOWER, xyz, radius, body)

@@ -120,5 +120,5 @@ def test_a_scheduler_that_ends_is_one_line():
 def test_a_worker_that_would_pour_something_else_is_refused_by_name(pool, monkeypatch):
     """A mesh file with other contents than here, or another version of a plug-in: the pour has another key there."""
     monkeypatch.setattr(dask_pool, "pour_key", lambda scene, seed: "another")
-    with pytest.raises(SchedulerError, match=r"^worker tcp://.*: has another version of a mesh file or of a plug-in"):
+    with pytest.raises(SchedulerError, match=r"^worker tcp://.*: its version of a mesh file or plug-in differs"):
         list(pool.run_queue(deque([Job(HEAP, 1)]), [HEAP]))

@@ -132,7 +132,7 @@ def test_what_cannot_be_read_is_one_clear_line(change, words):
 
 @pytest.mark.parametrize("raw", [b"", b"PK nonsense", (RAW_POURS / "trefoils.npz").read_bytes()[:-40]])
 def test_damaged_bytes_are_one_clear_line(raw):
-    with pytest.raises(RawPourError, match="not a raw pour, or a damaged one"):
+    with pytest.raises(RawPourError, match="not a raw pour, or damaged"):
         unpacked(raw)
 
 
@@ -155,5 +155,5 @@ def changed(raw, **arrays):
 )
 def test_an_archive_that_lacks_something_is_no_raw_pour(damage):
     raw = (RAW_POURS / "trefoils.npz").read_bytes()
-    with pytest.raises(RawPourError, match="not a raw pour, or a damaged one"):
+    with pytest.raises(RawPourError, match="not a raw pour, or damaged"):
         unpacked(changed(raw, **damage))

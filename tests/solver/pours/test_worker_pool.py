@@ -108,7 +108,7 @@ def test_nothing_is_left_after_close():
 @pytest.mark.parametrize("workers", [0, -1, 1.5])
 def test_less_than_one_worker_is_refused(workers):
     """None at all would let the queue wait for ever."""
-    with pytest.raises(ParameterError, match=f"workers {workers}: allowed: a whole number from 1 on"):
+    with pytest.raises(ParameterError, match=f"workers {workers}: allowed: a whole number of at least 1"):
         WorkerPool(workers)
 
 

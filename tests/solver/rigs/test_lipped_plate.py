@@ -40,5 +40,5 @@ def test_a_lip_keeps_what_rolls_away_from_a_bare_plate():
 
 def test_a_lip_beyond_the_domain_is_refused():
     """Bodies would be taken out before they come to it."""
-    with pytest.raises(ParameterError, match=r"^rig\.lip_diameter: 0\.2 m stands beyond rig\.domain_half_width"):
+    with pytest.raises(ParameterError, match=r"^rig\.lip_diameter: 0\.2 m reaches rig\.domain_half_width"):
         with_settings(BEADS, {"rig.lip_diameter": 0.2, "rig.domain_half_width": 0.1})

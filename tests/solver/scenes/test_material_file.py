@@ -55,13 +55,13 @@ def test_the_order_of_a_pair_is_free(scene):
         ("material.seed.shear_modulus", "-5MPa", "outside"),
         ("material.corn.density", 500, "seed"),
         ("pair.seed.corn.restitution", 0.5, "known"),
-        ("rig.outlet_diameter", "10mm", "narrower than a body"),
+        ("rig.outlet_diameter", "10mm", "too narrow for a body"),
         ("rig.outlet_diameter", "120mm", "inlet"),
         ("insertion.protocol", "shake", "pour_through"),
         ("body.spheres", "many", "coarse"),
         ("insertion.region_radius", "90mm", "wider than the feed opening"),
         ("rig.mass", "nan", "not a number"),
-        ("rig.domain_half_width", "55mm", "ends within the feed opening; allowed: more than 0.057"),
+        ("rig.domain_half_width", "55mm", "lies within the feed opening; allowed: more than 0.057"),
         ("rig.mas", 1, "rig.mass"),
     ],
 )
@@ -106,13 +106,13 @@ def mutated(**changes):
         ({"pair__seed__seed": None}, r"pair\.seed\.seed: no such pair"),
         ({"pair__seed__seed__restitution": 1.5}, "restitution"),
         ({"pair__seed__seed__restitution": None}, "restitution is missing"),
-        ({"pair__plate__seed": {"static_friction": 0.5, "restitution": 0.5}}, "stands twice"),
+        ({"pair__plate__seed": {"static_friction": 0.5, "restitution": 0.5}}, "appears twice"),
         (
             {"pair__seed__corn": {"static_friction": 0.5, "restitution": 0.5}},
             "no material or body 'corn'; known: seed,",
         ),
         ({"gravity": [0, 0]}, "gravity"),
-        ({"gravity": [0, 0, 9.81]}, r"gravity: \[0.0, 0.0, 9.81\] m/s2; allowed: down"),
+        ({"gravity": [0, 0, 9.81]}, r"gravity: \[0.0, 0.0, 9.81\] m/s2; allowed: third number below 0"),
         ({"gravity": [0, 0, 0]}, "gravity"),
         ({"gravity": [0, 0, -1e300]}, "up to 10000"),
         ({"wall": "glass"}, "glass"),
@@ -177,7 +177,7 @@ def test_a_box_may_reach_to_the_corners_of_its_domain():
     boxed = with_rig(load_material("glass_beads"), "draw_down_box")
     changed = {"rig.width": 0.1, "rig.depth": 0.1, "rig.domain_half_width": 0.06}
     assert with_values(boxed, changed).rig.domain_half_width == 0.06
-    with pytest.raises(ParameterError, match="ends within the feed opening; allowed: more than"):
+    with pytest.raises(ParameterError, match="lies within the feed opening; allowed: more than"):
         with_values(boxed, changed | {"rig.domain_half_width": 0.05})
 
 

@@ -139,7 +139,10 @@ def test_the_drawn_mesh_and_the_fit_come_with_the_file(tmp_path):
         ({"shape": {"box": [1e-2, 1e-2, 5e-3]}, "speres": "fine"}, r"body\.plate\.speres: unknown key"),
         ({"shape": {"box": [1e-2, 1e-2, 5e-3]}, "spheres": 0}, "nor a number from 1 to 128"),
         ({"file": "absent.toml"}, "absent.toml: no such file"),
-        ({"file": "dumbbell.toml", "mass": 1.0}, r"body with file = 'dumbbell.toml': mass: unknown key"),
+        (
+            {"file": "dumbbell.toml", "mass": 1.0},
+            r"body with file = 'dumbbell.toml': mass: not allowed together with file",
+        ),
         ({"file": "two.toml"}, r"two.toml: a body file holds format = 1 and one \[\[body\]\]"),
         ({"file": "loop.toml"}, "loop.toml: a body file holds"),
     ],
@@ -175,5 +178,5 @@ def test_measured_diameters_are_log_normal_sizes(tmp_path):
 
 
 def test_sizes_are_stated_once(tmp_path):
-    with pytest.raises(ParameterError, match="size: stands beside size_distribution or size_spread"):
+    with pytest.raises(ParameterError, match="size: given together with size_distribution or size_spread"):
         scene_with(tmp_path, **declared(), size={"mean": 2e-3, "sd": 2e-4}, size_spread=0.1)

@@ -38,7 +38,7 @@ def test_mean_and_sd_come_before_quantiles():
         ({"quantiles": {"p50": 1e-3}}, "at least two quantiles"),
         ({"mean": 1e-3}, "size: mean and sd are needed together"),
         ({"mean": 1e-3, "sd": -1e-4}, "size.sd: -0.0001 m; allowed: more than 0 m"),
-        ({"quantiles": {"q05": 1e-3, "p95": 2e-3}}, "size.quantiles.q05: not a quantile; allowed: p01 … p99"),
+        ({"quantiles": {"q05": 1e-3, "p95": 2e-3}}, "size.quantiles.q05: not a quantile; allowed: p and a percentage"),
         ({"quantiles": {"p00": 1e-3, "p95": 2e-3}}, "size.quantiles.p00: not a quantile"),
         (
             {"quantiles": {"p05": 3e-3, "p50": 2.5e-3, "p95": 2e-3}},

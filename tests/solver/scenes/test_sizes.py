@@ -203,7 +203,7 @@ def test_the_largest_body_has_to_fit():
     with pytest.raises(ParameterError, match=r"insertion\.region_radius.*too narrow for a body of 0\.10"):
         varied(SHIPPED, "log_normal", 0.2, ["petiole"])
     # a plate is 15.02 mm wide: three times that does not pass an outlet of 30 mm
-    with pytest.raises(ParameterError, match=r"outlet_diameter.*narrower than a body"):
+    with pytest.raises(ParameterError, match=r"outlet_diameter.*too narrow for a body"):
         varied(SHIPPED, "log_normal", 0.4, ["plate"])
 
 
