@@ -53,7 +53,6 @@ class RotatingDrum(PourRig):
     name = "rotating_drum"
     surface_names = ("shell", "front", "back")
     gives = (FREE_SURFACE,)
-    forgets = ("insertion.rate", "insertion.drop_speed")
     quick_changes: ClassVar[Mapping[str, Mapping[str, float]]] = {
         "turned twice as fast": {"rig.speed_rpm": 2.0},
         "turned at half the speed": {"rig.speed_rpm": 0.5},

@@ -126,13 +126,6 @@ def test_a_rig_s_own_changes_are_on_the_menu(measured):
         assert set(pour_rig(scene).quick_changes) <= {change.name for change, _ in feasible(scene)}
 
 
-def test_a_drum_forgets_how_it_was_fed_and_is_not_asked_to_be_fed_otherwise(measured):
-    offered = {name: {change.name for change, _ in feasible(with_rig(measured.scene, name))} for name in RIGS}
-    fed = {"fed four times as fast", "fed at 0.4 times the rate", "dropped four times as fast"}
-    assert [name for name, found in offered.items() if not fed & found] == ["rotating_drum"]
-    assert offered["rotating_drum"] == {"as it is, poured again", *RIGS["rotating_drum"].quick_changes}
-
-
 def test_what_is_calibrated_is_changed_by_no_candidate(measured):
     scene = measured.fit[0].scene
     paths = {path for _, values in feasible(scene, {"rig.outlet_height"}) for path in values}
