@@ -89,6 +89,24 @@ def cancel_resume_cancel(page):
     shown(page, "Cancelled.")
 
 
+def test_a_number_box_that_is_emptied_shows_the_number_that_holds_when_it_is_left(page):
+    unfold(page, "Ranges and target of the next study")
+    box = page.get_by_label("Target: mean [°]")
+    for typed in ("", "-"):
+        box.fill("26.5")
+        shown(page, "26.5°")
+        box.press("Control+a")
+        box.press("Delete")
+        box.press_sequentially(typed)
+        assert box.input_value() == typed
+        box.press("Tab")
+        wait_for(lambda: box.input_value() == "26.5")
+    shown(page, "26.5°")
+    press(page, "Reset to file")
+    wait_for(lambda: box.input_value() == "24.68")
+    shown(page, "Ranges and target are those of the file.")
+
+
 def test_the_newest_finished_study_is_a_board_with_its_verdict_and_charts(page):
     shown = board(page, "Study")
     shown.locator(".banner strong").wait_for()

@@ -1,10 +1,26 @@
-// What viser's page lacks for the keyboard and for screen readers: sections that open by a key, names of controls, and
-// arrow keys that stay with the slider they are pressed on.
+// What viser's page lacks for the keyboard and for screen readers: sections that open by a key, names of controls,
+// arrow keys that stay with the slider they are pressed on, and number boxes that show what they hold.
 const root = document.getElementById("root");
 root.setAttribute("role", "main");
 root.addEventListener("keydown", event => {
   // What listens for keys on the whole document, viser's commands and its camera, does not hear of it.
   if (event.key.startsWith("Arrow") && event.target.closest("[role=slider]")) event.stopPropagation();
+});
+
+// Of an emptied number box, or one with half a number, viser sends nothing: the last number goes on holding, and the box
+// shows it again when it is left.
+const held = new WeakMap();
+const isNumber = text => text.trim() !== "" && Number.isFinite(Number(text));
+root.addEventListener("beforeinput", event => {
+  const box = event.target;
+  if (box.matches(".mantine-NumberInput-input") && isNumber(box.value)) held.set(box, box.value);
+});
+root.addEventListener("focusout", event => {
+  const box = event.target;
+  if (!held.has(box) || isNumber(box.value)) return;
+  // By the element's own setter and an event, so that viser's framework takes it for typed.
+  Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set.call(box, held.get(box));
+  box.dispatchEvent(new Event("input", { bubbles: true }));
 });
 
 // Heads of viser's sections, open or not.
