@@ -72,7 +72,7 @@ CHANGES = (
     Change("dropped four times as fast", {"insertion.drop_speed": 4.0}),
     Change("filled with the outlet closed, then opened", choices={"insertion.protocol": "fill_then_open"}),
 )
-"""Of any rig; each has its own beside them (``PourRig.quick_changes``)."""
+"""Of any rig but for what it ``forgets``; each has its own beside them (``PourRig.quick_changes``)."""
 
 
 @dataclass(frozen=True)
@@ -215,7 +215,7 @@ def feasible(scene: Scene, calibrated: Collection[str] = ()) -> list[tuple[Chang
     None of what is ``calibrated``: every pour sets that by itself.
     """
     found = []
-    known = set(parameters(scene)) - set(calibrated)
+    known = set(parameters(scene)) - set(calibrated) - set(pour_rig(scene).forgets)
     for change in (*CHANGES, *(Change(*own) for own in pour_rig(scene).quick_changes.items())):
         if "insertion.protocol" in change.choices and scene.numerics.duration > 0.0:
             continue  # filled first, it would be read before it has run out

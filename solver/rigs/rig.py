@@ -217,6 +217,13 @@ class PourRig(Rig, Protocol):
         """
         return {}
 
+    @property
+    def forgets(self) -> tuple[str, ...]:
+        """Paths of parameters of any rig that leave no trace in what is read off this one; a diagnosis changes none of
+        them to tell answers apart.
+        """
+        return ()
+
     def poured_mass(self, density: float) -> float:
         """Mass to be poured [kg] of bodies whose solid has ``density`` [kg/m³]."""
         ...

@@ -28,6 +28,9 @@ from solver.rigs.surface import FACING_MINUS_Y, FACING_PLUS_Y, Revolved, Surface
 FEED_BOTTOM, FEED_WIDTH, FEED_TOP = 0.1, 0.6, 0.75
 """The feed: between these heights above the axis and within this half width, in radii of the drum. Its upper corners
 lie 0.96 radii from the axis."""
+TURNED_OVER = 0.5
+"""Turns after which the filling is forgotten. Of 89 beads in a drum of 16 bead diameters, fed at 0.4 and 4 times the
+rate, the angle after half a turn shows no trend: + 0.7° and + 0.6° with standard errors of 0.4° and 0.5°."""
 MOST_FILLED = 0.5
 """Largest share of the drum's volume that may be filled: the feed is above the axis."""
 
@@ -59,6 +62,11 @@ class RotatingDrum(PourRig):
         "bed 1.3 times as large": {"rig.filled_volume": 1.3},
         "bed 0.7 times as large": {"rig.filled_volume": 0.7},
     }
+
+    @property
+    def forgets(self) -> tuple[str, ...]:
+        """How it was fed, once every body of a bed of up to half the drum has been through the flowing layer."""
+        return ("insertion.rate", "insertion.drop_speed") if self.transient_turns >= TURNED_OVER else ()
 
     @property
     def suits(self) -> Mapping[str, float | str]:

@@ -126,6 +126,15 @@ def test_a_rig_s_own_changes_are_on_the_menu(measured):
         assert set(pour_rig(scene).quick_changes) <= {change.name for change, _ in feasible(scene)}
 
 
+def test_a_drum_forgets_how_it_was_fed_and_is_not_asked_to_be_fed_otherwise(measured):
+    offered = {name: {change.name for change, _ in feasible(with_rig(measured.scene, name))} for name in RIGS}
+    fed = {"fed four times as fast", "fed at 0.4 times the rate", "dropped four times as fast"}
+    assert [name for name, found in offered.items() if not fed & found] == ["rotating_drum"]
+    assert offered["rotating_drum"] == {"as it is, poured again", *RIGS["rotating_drum"].quick_changes}
+    at_once = with_values(with_rig(measured.scene, "rotating_drum"), {"rig.transient_turns": 0.1})
+    assert fed <= {change.name for change, _ in feasible(at_once)}
+
+
 def test_what_is_calibrated_is_changed_by_no_candidate(measured):
     scene = measured.fit[0].scene
     paths = {path for _, values in feasible(scene, {"rig.outlet_height"}) for path in values}
@@ -302,7 +311,7 @@ def test_a_range_narrowed_by_another_condition_stays_narrow(tmp_path):
         text[:at] + "axial_length = 0.0195" + text[at + len("axial_length = 0.020") :]
     )
     measured = load_measurement(source)
-    folder = written(tmp_path / "next", source, measured, "fed four times as fast")
+    folder = written(tmp_path / "next", source, measured, "turned twice as fast")
     again = read_next(fill(folder)).measurement
     assert again.parameters == measured.parameters
     assert set(again.conditions[0].offered) == set(measured.fit[0].offered)

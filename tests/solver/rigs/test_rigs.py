@@ -55,6 +55,12 @@ def test_what_a_laboratory_can_change_makes_another_rig_that_passes_its_checks(n
 
 
 @pytest.mark.parametrize("name", RIGS)
+def test_what_a_rig_forgets_is_a_parameter_of_any_rig(name):
+    scene = with_settings(bead_scene(), {"rig.name": name})
+    assert set(pour_rig(scene).forgets) <= {path for path in parameters(scene) if path.startswith("insertion.")}
+
+
+@pytest.mark.parametrize("name", RIGS)
 def test_what_suits_a_rig_makes_a_scene_that_passes_its_checks(name):
     scene = with_settings(bead_scene(), {"rig.name": name})
     assert scene.rig.name == name
