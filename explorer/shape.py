@@ -103,13 +103,15 @@ def _check(order: ShapeOrder) -> None:
         raise CommandError("--spheres and --error exclude each other")
     for option, number in (("--spheres", order.number), ("--most", order.most)):
         if number is not None and not 1 <= number <= MOST_SPHERES:
-            raise CommandError(f"{option} {number}: allowed are 1 … {MOST_SPHERES}")
+            raise CommandError(f"{option} {number}; allowed: 1 … {MOST_SPHERES}")
     if order.limit is not None and order.limit <= 0.0:
         raise CommandError(f"--error {order.limit:g} m: must be positive")
     if not 0.1 <= order.smallest <= 1.0:
-        raise CommandError(f"--smallest {order.smallest:g}: allowed are 0.1 … 1")
+        raise CommandError(f"--smallest {order.smallest:g}; allowed: 0.1 … 1")
     if not NAME.fullmatch(order.name):
-        raise CommandError(f"--name {order.name!r}: no blank, dot, quote or backslash is allowed, nor nothing at all")
+        raise CommandError(
+            f"--name {order.name!r}: allowed: at least one character, without blanks, dots, quotes and backslashes"
+        )
     if order.out is not None:
         check_new_file(order.out, suffix=".toml")
 
@@ -125,7 +127,7 @@ def mesh_solid(file: Path, unit: str | None, unit_input: str) -> Solid:
     longest = float(surface_mesh(solid).extents.max())
     if not LEAST_EXTENT <= longest <= LARGEST_EXTENT:
         raise CommandError(
-            f"{file}: {mm(longest)} mm long with coordinates in {unit}; allowed are {mm(LEAST_EXTENT)} … "
+            f"{file}: {mm(longest)} mm long with coordinates in {unit}; allowed: {mm(LEAST_EXTENT)} … "
             f"{mm(LARGEST_EXTENT)} mm: is it in another {unit_input} ({', '.join(LENGTH_UNITS)})?"
         )
     return solid
@@ -166,7 +168,7 @@ def _taken(
         return found, f"the fewest tried with an RMS of at most {mm(limit)} mm ({asked})"
     if order.limit is not None:
         raise CommandError(
-            f"--error {mm(limit)} mm: not reached with {order.most} spheres, the least is {mm(best.error.rms)} mm; "
+            f"--error {mm(limit)} mm: not reached with {order.most} spheres; the smallest is {mm(best.error.rms)} mm; "
             "allow a larger error, a larger --most or a smaller --smallest"
         )
     return best, f'the least RMS; the {mm(limit)} mm of spheres = "standard" are not reached'

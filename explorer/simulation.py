@@ -83,9 +83,9 @@ def simulation_of(order: SimulateOrder, events: bool = False) -> Simulation:
     """
     check_scheduler(order.scheduler, order.threads)
     if order.scheduler and order.watched:
-        raise CommandError(f"{order.watched}: is for pours that run on this machine; leave --scheduler out")
+        raise CommandError(f"{order.watched}: allowed only for pours on this machine; leave out --scheduler")
     if order.replicates > 1 and (order.checkpoint or order.resume):
-        raise CommandError("--checkpoint and --resume are for one pour, not for --replicates")
+        raise CommandError("--checkpoint and --resume: allowed for one pour only; leave out --replicates")
     interrupted = read_checkpoint(order.resume) if order.resume else None
     if order.checkpoint and not order.checkpoint.absolute().parent.is_dir():
         raise CommandError(f"--checkpoint: {order.checkpoint}: no folder {order.checkpoint.absolute().parent}")

@@ -76,7 +76,7 @@ class DefinitiveScreening(Design):
 
     name = "definitive-screening"
     title = "definitive screening"
-    doc = "Three levels: main effects clear of interactions and squares, and curvature seen, in about twice k runs."
+    doc = "Three levels: main effects clear of interactions and squares, and curvature, in about 2k runs for k factors."
     options = ("centre",)
 
     def points(self, factors: int, options: DesignOptions) -> Points:

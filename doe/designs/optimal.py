@@ -344,7 +344,7 @@ class DOptimal(OptimalDesign):
 
     name = "d-optimal"
     title = "D-optimal"
-    doc = "Any number of runs for a given model, within constraints or beside finished runs: best coefficients."
+    doc = "Any number of runs for a given model, within constraints or added to finished runs: precise coefficients."
     mean_variance = False
 
 
@@ -353,7 +353,7 @@ class IOptimal(OptimalDesign):
 
     name = "i-optimal"
     title = "I-optimal"
-    doc = "The same for the best prediction in the mean over the region."
+    doc = "As d-optimal, but for the smallest mean variance of the prediction over the region."
     mean_variance = True
 
 

@@ -176,7 +176,7 @@ class PlackettBurman(Design):
 
     name = "plackett-burman"
     title = "Plackett–Burman"
-    doc = "Main effects of up to 47 factors in 8 to 48 runs; folded over, clear of interactions of two."
+    doc = "Main effects of up to 47 factors in 8 to 48 runs; folded over, clear of two-factor interactions."
     options = ("runs", "centre", "fold", "nonregular")
     main_effects_only = True
 

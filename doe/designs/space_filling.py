@@ -59,7 +59,7 @@ class Sobol(Design):
 
     name = "sobol"
     title = "Sobol'"
-    doc = "Points spread over the ranges (Sobol' sequence), for a surrogate model; best as a power of two."
+    doc = "Points spread over the ranges (Sobol' sequence), for a surrogate model; best with 2, 4, 8, … runs."
     options = ("runs",)
 
     def points(self, factors: int, options: DesignOptions) -> Points:

@@ -22,7 +22,7 @@ def read_entries(folder: Path) -> TableEntries:
     """``study.toml`` of a folder. Raises AuditError where it is missing or is no TOML."""
     path = folder / FILE
     if not path.is_file():
-        raise AuditError(f"{path}: no such file; doe/audit/README.md says what belongs into it")
+        raise AuditError(f"{path}: no such file; doe/audit/README.md describes its content")
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8-sig"), parse_float=Digits)
     except UnicodeDecodeError:
@@ -49,14 +49,14 @@ class TableEntries:
         """A text; AuditError where it is missing without a default."""
         value = self._get(key, default)
         if not isinstance(value, str) or isinstance(value, Digits):
-            raise self.error(key, f"a text is needed, not {value!r}")
+            raise self.error(key, f"a string is needed, not {value!r}")
         return value
 
     def texts(self, key: str) -> tuple[str, ...]:
         """A list of texts."""
         value = self._get(key)
         if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-            raise self.error(key, "a list of texts is needed")
+            raise self.error(key, "a list of strings is needed")
         return tuple(map(str, value))
 
     def figure(self, key: str) -> Printed:
@@ -77,7 +77,7 @@ class TableEntries:
         """A number with low < number ≤ high."""
         value = self.figure(key).value
         if not low < value <= high:
-            raise self.error(key, f"{value:g} is not allowed; allowed: {low:g} … {high:g}")
+            raise self.error(key, f"{value:g} is not allowed; allowed: above {low:g}, up to {high:g}")
         return value
 
     def whole(self, key: str, low: int, high: int = 1_000_000) -> int:
@@ -114,7 +114,7 @@ class TableEntries:
         """Raise AuditError for a key that nothing asked for."""
         left = [key for key in self._table if key not in self._taken]
         if left:
-            raise self.error(left[0], f"unknown key; known here: {', '.join(sorted(self._taken))}")
+            raise self.error(left[0], f"unknown key; allowed: {', '.join(sorted(self._taken))}")
 
     def error(self, key: str, words: str) -> AuditError:
         """An error about one key of this table."""

@@ -229,7 +229,7 @@ def read_screening(entries: TableEntries, folder: Path) -> Screening:
     factors, anova = read_table(folder, entries.text("factors")), read_table(folder, entries.text("anova"))
     names = factors.texts("factor")
     if anova.texts("factor") != names:
-        raise AuditError(f"{anova.name}: its factors are not those of {factors.name}, in the same order")
+        raise AuditError(f"{anova.name}: its factors differ from those of {factors.name}, or are in another order")
     design = _numbers(runs, names) if entries.flag("design", False) else None
     ranges = tuple(
         ScreenedFactor(name, factors.number("low", k).value, factors.number("high", k).value)
@@ -244,7 +244,9 @@ def read_screening(entries: TableEntries, folder: Path) -> Screening:
     if unknown:
         raise entries.error("significant", f"{unknown[0]!r} is not one of {', '.join(names)}")
     if runs.rows <= len(names):
-        raise AuditError(f"{runs.name}: {runs.rows} runs cannot tell {len(names)} factors; one more is needed")
+        raise AuditError(
+            f"{runs.name}: {runs.rows} runs are too few for {len(names)} factors; allowed: at least {len(names) + 1}"
+        )
     return Screening(
         where_runs=entries.text("where_runs"),
         where_anova=entries.text("where_anova"),
@@ -333,7 +335,7 @@ def _steps(entries: TableEntries, ascent: Ascent | None) -> DesignSteps:
         found[key] = entries.text(key)
         if ascent is None or found[key] not in ascent.steps:
             known = "there is no [ascent]" if ascent is None else f"allowed: {', '.join(ascent.steps)}"
-            raise entries.error(key, f"{found[key]!r} is no step of the ascent; {known}")
+            raise entries.error(key, f"{found[key]!r} is not a step of the ascent; {known}")
     entries.finish()
     return DesignSteps(**found)
 
@@ -373,7 +375,7 @@ def read_optimum(entries: TableEntries, surfaces: tuple[SurfaceStudy, ...]) -> O
     """``[optimum]`` with ``values``: factor of the surface → its value, natural unit. Of several surfaces ``surface``
     says which one, by its ``where_anova``."""
     if not surfaces:
-        raise entries.error("values", "there is no [surface] that this could be the optimum of")
+        raise entries.error("values", "there is no [surface] for this optimum")
     places = [surface.where_anova for surface in surfaces]
     where = entries.text("surface", None if len(places) > 1 else places[0])
     if where not in places:
@@ -453,7 +455,7 @@ def read_table(folder: Path, name: str) -> PrintedTable:
         raise AuditError(f"{path}: a line of column names and at least one row are needed")
     (_, header), *rows = table.rows
     if len(set(header)) < len(header) or "" in header:
-        raise AuditError(f"{path}: column names must be there and differ: {', '.join(header)}")
+        raise AuditError(f"{path}: every column needs a name of its own: {', '.join(header)}")
     for number, row in rows:
         if len(row) != len(header):
             raise AuditError(f"{path}, line {number}: {len(row)} cells; the table has {len(header)} columns")

@@ -172,7 +172,7 @@ class CommandProcess:
         with self._log().open("ab") as log:
             # The child inherits the lock with the open file, and holds it to its end, whatever becomes of the page.
             if not _locked(log, patience):
-                raise BackgroundError(f"{out}: runs already, started from another page")
+                raise BackgroundError(f"{out}: another page's command is running there; wait until it ends")
             # A session of its own: Ctrl-C for the page must not cut a run in two, cancel() ends it in order.
             self._process = subprocess.Popen(
                 lowered((*self._program, *arguments), BACKGROUND),

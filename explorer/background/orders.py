@@ -113,7 +113,7 @@ class OrderedCommands(ABC, Generic[Order]):
     def _add(self, order: Order) -> None:
         """Begin ``order`` after those before it, at once if nothing runs. Raises BackgroundError if it is full."""
         if len(self._line) >= MOST_WAITING:
-            raise BackgroundError(f"{MOST_WAITING} {self._what} wait already; more are not kept")
+            raise BackgroundError(f"{MOST_WAITING} {self._what} are already waiting, the most that are kept")
         self._line.append(order)
         if not self.status().alive:
             self._begin_next()

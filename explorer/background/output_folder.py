@@ -43,7 +43,7 @@ def kept_for_one(folder: Path) -> Iterator[None]:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise CommandError(
-                f"--out {folder}: another command is at work there; wait for it, or name another"
+                f"--out {folder}: another command is writing there; wait for it, or name another folder"
             ) from None
         yield
     finally:
@@ -129,7 +129,7 @@ def _object(file: Path) -> dict[str, Any]:
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
     except RecursionError:
-        raise ValueError("brackets within brackets without end") from None
+        raise ValueError("brackets are nested too deeply") from None
     if not isinstance(content, dict):
         raise ValueError("not a JSON object")
     return content

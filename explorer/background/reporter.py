@@ -157,7 +157,7 @@ class Reporter:
         if self._diverged >= MOST_SCENES:
             return
         self._diverged += 1
-        last = "; further ones are not told" if self._diverged == MOST_SCENES else ""
+        last = "; further ones are not reported" if self._diverged == MOST_SCENES else ""
         if folder is None:
             self.say(f"{what}; to reproduce it, run `explorer simulate` with this scene and --seed {seed}{last}")
             return

@@ -54,7 +54,7 @@ def analyse(
     from explorer.files.run_folder import json_text
 
     if target_error and target is None:
-        raise CommandError("--target-error: belongs to --target")
+        raise CommandError("--target-error: allowed only with --target")
 
     order = AnalyseOrder(
         sheet=sheet,

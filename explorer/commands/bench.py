@@ -73,9 +73,9 @@ def bench(
         if n not in BEDS:
             raise CommandError(f"--spheres: {n} is not one of {', '.join(map(str, BEDS))}")
     if spheres and only and "bed" not in only:
-        raise CommandError("--spheres: belongs to the case bed, which --only leaves out")
+        raise CommandError("--spheres: applies to the case bed, which --only leaves out")
     if duration != USUAL_DURATION and only and "pour" not in only:
-        raise CommandError("--duration: belongs to the case pour, which --only leaves out")
+        raise CommandError("--duration: applies to the case pour, which --only leaves out")
     for option, path in (("--json", json), ("--table", table)):
         if path and not path.absolute().parent.is_dir():
             raise CommandError(f"{option}: {path}: no folder {path.absolute().parent}")
@@ -130,5 +130,5 @@ def _earlier(path: Path) -> dict[str, Any]:
     except (OSError, ValueError, KeyError, TypeError) as problem:
         raise CommandError(f"--against: {path}: not what --json of this command writes ({problem})") from None
     if not any(ratio for _, _, ratio in rows):
-        raise CommandError(f"--against: {path}: has no ratio to LIGGGHTS")
+        raise CommandError(f"--against: {path}: holds no ratio to LIGGGHTS")
     return found

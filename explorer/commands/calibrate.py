@@ -80,7 +80,8 @@ def calibrate(
     folder, piles = (None, record) if one_file else (record, None)
     if scheduler and folder is not None:
         raise CommandError(
-            f"--record {folder}: a folder takes pours of this machine; leave --scheduler out, or name a .rrd file"
+            f"--record {folder}: a folder records only pours on this machine; leave out --scheduler, or name a .rrd "
+            "file"
         )
     order = StudyOrder(
         study,

@@ -124,7 +124,9 @@ def design(
     check_new_file(out, option="--out")
     workbook = out.suffix.lower() == WORKBOOK
     if workbook and decimal_comma:
-        raise CommandError(f"--decimal-comma: {out} is a workbook, which shows numbers as its reader has them")
+        raise CommandError(
+            f"--decimal-comma: not allowed for the workbook {out}, which shows numbers as the reader's program is set"
+        )
     if report is not None:
         check_vacant(report, "--report")
     check_power(sigma, effect)

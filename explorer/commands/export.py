@@ -67,9 +67,9 @@ def export(
     target = EXPORTS[to]
     if every is not None and "every" not in target.options:
         takers = " or ".join(name for name, one in EXPORTS.items() if "every" in one.options)
-        raise CommandError(f"--every: belongs to --to {takers}, not to {to}")
+        raise CommandError(f"--every: allowed only with --to {takers}, not with {to}")
     if target.of_material and (time is not None or seed is not None):
-        raise CommandError(f"--time, --seed: of a pour, and --to {to} takes the material alone")
+        raise CommandError(f"--time, --seed: not allowed with --to {to}, which exports only the material")
     scene, caution = named_scene(source, material)
     if caution:
         typer.echo(f"note: {caution}", err=True)

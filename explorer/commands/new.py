@@ -52,7 +52,7 @@ def material(
     if len(given) > 1 or (given and (like is not None or part)):
         from explorer.errors import CommandError
 
-        raise CommandError(f"--from-{next(iter(given))}: allowed without --like, --part and another --from-…")
+        raise CommandError(f"--from-{next(iter(given))}: not allowed together with --like, --part or another --from-…")
     if given:
         from explorer.imported import write_imported
 

@@ -32,7 +32,7 @@ def replay(
     if native and static:
         raise CommandError("--native and --static exclude each other")
     if (native or static) and (port or no_browser):
-        raise CommandError("--port, --no-browser: belong to the page, which --native and --static do without")
+        raise CommandError("--port, --no-browser: not allowed with --native or --static, which open no page")
     check_recording(recording)
     if native:
         open_native(recording)

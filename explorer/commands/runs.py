@@ -29,7 +29,7 @@ def runs(
     kept = Store(path, pouring=False)
     if study is not None and not any(True for _ in kept.runs(study)):
         raise CommandError(
-            f"--study {study}: no runs of it in {path}; `explorer runs --store {path}` lists its studies"
+            f"--study {study}: no runs of this study in {path}; `explorer runs --store {path}` lists its studies"
         )
     if csv:
         # All of them first: what is read anew is written back.

@@ -52,14 +52,16 @@ def serve(
 
     check_scheduler(scheduler)
     if replay and (project or study or material or set_ or record or rerun or scheduler or store or seed is not None):
-        raise CommandError(f"--replay {replay}: a recording has its own material and parameters; leave the others out")
+        raise CommandError(
+            f"--replay {replay}: a recording has its own material and parameters; leave out the other options"
+        )
     if replay:
         replay_page(replay, host=host, port=port, token=token)
         return
     if study and material:
         raise CommandError(f"--material {material}: the study {study} has a material of its own; name one of the two")
     if project and (study or material):
-        raise CommandError(f"{project}: a project names its study and material itself; leave --study, --material out")
+        raise CommandError(f"{project}: a project names its own study and material; leave out --study and --material")
     if project:
         opened = load_project(project)
     elif material:

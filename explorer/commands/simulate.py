@@ -71,7 +71,7 @@ def simulate(
 
     end_as_by_ctrl_c()
     if json and events:
-        raise CommandError("--json prints the result, --events what happens meanwhile; name one of them")
+        raise CommandError("--json prints the result, --events the progress; allowed: one of the two")
     order = SimulateOrder(
         source=source,
         material=material,

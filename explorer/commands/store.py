@@ -34,7 +34,7 @@ def check(file: Path | None = STORE) -> None:
         typer.echo(f"damaged: {line}", err=True)
     if found.damaged:
         raise typer.Exit(FAILURE)
-    typer.echo("whole: every raw pour can be read")
+    typer.echo("intact: every raw pour can be read")
 
 
 @app.command()

@@ -67,17 +67,17 @@ def verify(
     if json and not json.absolute().parent.is_dir():
         raise CommandError(f"--json: {json}: no folder {json.absolute().parent}")
     if peer_limit is not None and not peers:
-        raise CommandError("--peer-limit: belongs to --peers")
+        raise CommandError("--peer-limit: allowed only with --peers")
     if economy is not None:
         if only or peers or every:
-            raise CommandError("--economy: compares piles and nothing else; leave --only, --peers and --all out")
+            raise CommandError("--economy: only compares piles; leave out --only, --peers and --all")
         from explorer.study.economy import compare_economy, economy_text
 
         asked = (economy, profile or "standard", change or "larger_steps", pours or USUAL_POURS)
         typer.echo(economy_text(compare_economy(*asked, store, json, typer.echo)))
         return
     if any(one is not None for one in (change, profile, pours, store)):
-        raise CommandError("--change, --profile, --pours, --store: belong to --economy")
+        raise CommandError("--change, --profile, --pours, --store: allowed only with --economy")
     from explorer.export.impacts import liggghts_engine
     from explorer.export.run import installed
     from explorer.files.output_file import write_whole
@@ -95,7 +95,7 @@ def verify(
     shared = [name for name in chosen if name in BY_ANY_ENGINE]
     if peers:
         if not shared:
-            raise CommandError(f"--peers: runs {', '.join(BY_ANY_ENGINE)}, and --only names none of them")
+            raise CommandError(f"--peers: runs only {', '.join(BY_ANY_ENGINE)}, but --only names none of them")
         installed("liggghts")
     rows = list(rows_of(chosen))
 

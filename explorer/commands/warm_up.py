@@ -33,7 +33,7 @@ def warm_up(
     from solver.arch import chosen
 
     if chosen() != "cpu":
-        raise CommandError(f"warm-up: what is compiled for {chosen()} is kept by no command; leave --arch out")
+        raise CommandError(f"warm-up: kernels compiled for {chosen()} are not kept; allowed: --arch cpu")
     rooms = _rooms_of(sources) if sources else _shipped_rooms()
     names = list(rooms)
     for number, seconds in compiled(list(rooms.values()), threads):

@@ -80,9 +80,9 @@ def run_analyse(order: AnalyseOrder) -> DesignResult:
         if value is not None and not abs(value) < math.inf:
             raise CommandError(f"{option} {value:g}: allowed: a finite number")
     if order.target_error < 0:
-        raise CommandError(f"--target-error {order.target_error:g}: allowed: 0 and more")
+        raise CommandError(f"--target-error {order.target_error:g}: allowed: 0 or more")
     if order.order is not None and order.terms:
-        raise CommandError("--terms: stands instead of --model; allowed: one of them")
+        raise CommandError("--terms: given together with --model; allowed: one of the two")
     path = asset_path("runs", order.sheet)
     factors = read_factors(asset_path("designs", order.factors)).factors if order.factors else ()
     sheet = read_sheet(path, factors)
@@ -144,12 +144,13 @@ def _refuse_surrogate(runs: Runs, order: AnalyseOrder) -> None:
     """A Gaussian process has no groups, and no distance between three names."""
     for option, given in {"--block": runs.blocks, "--random": runs.groups}.items():
         if given is not None:
-            raise CommandError(f"--surrogate {order.surrogate}: has no groups of runs; allowed: without {option}")
+            raise CommandError(f"--surrogate {order.surrogate}: cannot take groups of runs; leave out {option}")
     for factor in runs.factors:
         if factor.levels:
             others = ",".join(other.name for other in runs.factors if not other.levels)
             raise CommandError(
-                f"--surrogate {order.surrogate}: {factor.name} is no number; allowed: factors that are, --only {others}"
+                f"--surrogate {order.surrogate}: {factor.name} has named levels; allowed: numeric factors, as with "
+                f"--only {others}"
             )
 
 
@@ -195,7 +196,9 @@ def _mixture(runs: Runs, region: Region, order: AnalyseOrder) -> DesignAnalysis:
     }
     for option, given in asked.items():
         if given:
-            raise CommandError(f"{option}: is not for a mixture: in {order.sheet} the factors add up to one sum")
+            raise CommandError(
+                f"{option}: not allowed for a mixture: in {order.sheet} the factors add up to a constant sum"
+            )
     polynomial: MixtureOrder | None = None
     if order.order is not None:
         polynomial = "linear" if order.order == ModelOrder.LINEAR else "quadratic"
@@ -225,7 +228,7 @@ def _random(runs: Runs, region: Region, order: AnalyseOrder, groups: Blocks) -> 
     """The model with groups that are drawn at random; raises CommandError for what is not for one."""
     for option, given in {"--target": order.target is not None, "--reduce": order.reduction}.items():
         if given:
-            raise CommandError(f"{option}: is not for --random {order.random}; allowed: --block {order.random}")
+            raise CommandError(f"{option}: not allowed with --random {order.random}; allowed: --block {order.random}")
     try:
         found = fit_random(
             runs.coded,
@@ -277,8 +280,8 @@ def _refuse_dependent(runs: Runs, region: Region, sheet: str) -> None:
     for name, level, width in zip(names, levels[0], spread, strict=True):
         if width < SAME:
             raise CommandError(
-                f"{sheet}, column {name}: is {level:.6g} in every run with a result, so that nothing tells what it "
-                f"does; allowed: leave it out with --only {','.join(one for one in names if one != name)}"
+                f"{sheet}, column {name}: is {level:.6g} in every run with a result, so its effect cannot be "
+                f"estimated; leave it out with --only {','.join(one for one in names if one != name)}"
             )
     if int(valid.sum()) <= len(names):
         return  # too few runs for anything, which is told where the model is fitted
@@ -294,7 +297,7 @@ def _refuse_dependent(runs: Runs, region: Region, sheet: str) -> None:
     else:
         what = f"{listed} change together in every run, so that their effects cannot be told apart"
     kept = [name for k, name in enumerate(names) if k != tied[-1]]
-    raise CommandError(f"{sheet}: {what}; allowed: leave one out, as with --only {','.join(kept)}")
+    raise CommandError(f"{sheet}: {what}; leave one out, as with --only {','.join(kept)}")
 
 
 def _run_notes(runs: Runs, region: Region, found: DesignAnalysis) -> list[str]:
@@ -391,7 +394,7 @@ def _symbols(runs: Runs, terms: tuple[str, ...]) -> tuple[str, ...]:
         names = sorted({symbol(part.strip()) for part in parts}, key=letters.index)
         square = term.endswith(("^2", "²")) or len(parts) > len(names)
         if len(parts) > 2 or (square and len(names) > 1):
-            raise CommandError(f"--terms {term}: allowed are factors, products of two and squares, as in A,B,A*B,A^2")
+            raise CommandError(f"--terms {term}: allowed: factors, products of two and squares, as in A,B,A*B,A^2")
         found.append(f"{names[0]}^2" if square else "*".join(names))
     return tuple(found)
 
@@ -428,7 +431,7 @@ def _only_response(path: Path, responses: list[str]) -> str:
     if len(responses) == 1:
         return responses[0]
     raise CommandError(
-        f"{path}: --response NAME is needed; the responses are {', '.join(responses) or 'none: add a column'}"
+        f"{path}: --response NAME is needed; the responses are {', '.join(responses) or 'none; add a column'}"
     )
 
 

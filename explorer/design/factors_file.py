@@ -131,11 +131,13 @@ def make_factor(name: str, low: float, high: float, unit: str, reference: float 
         raise StudyFileError(f"{where}.unit: {unit!r}; allowed: up to 20 characters without | , ; < > [ ] or quotes")
     for key, value in (("low", low), ("high", high), ("reference", reference)):
         if value is not None and not math.isfinite(value):
-            raise StudyFileError(f"{where}.{key}: {value!r} is not a number")
+            raise StudyFileError(f"{where}.{key}: {value!r} is not a finite number")
     if not low < high:
         raise StudyFileError(f"{where}.high: {high:g} is not above low {low:g} ({name})")
     if not math.isfinite(high - low):
-        raise StudyFileError(f"{where}: the range {low:g} … {high:g} of {name} is too wide to be a number")
+        raise StudyFileError(
+            f"{where}: the range {low:g} … {high:g} of {name} is too wide; allowed: a finite difference"
+        )
     middle = low + (high - low) / 2 if reference is None else reference
     return DesignFactor(name, low, high, "" if unit == "1" else unit, middle)
 
@@ -175,7 +177,7 @@ def coded_constraint(text: str, factors: tuple[DesignFactor, ...]) -> tuple[floa
 
     Factors go by `factor_words`. Raises CommandError.
     """
-    allowed = "allowed: a form such as A + 2*B <= 30, with letters or names of factors"
+    allowed = "allowed: the form A + 2*B <= 30, with letters or names of factors"
     sides = re.split("<=|>=|≤|≥", text)
     if len(sides) != 2:
         raise CommandError(f"--constraint {text!r}: {allowed}")
@@ -197,7 +199,7 @@ def coded_constraint(text: str, factors: tuple[DesignFactor, ...]) -> tuple[floa
             if named is None:
                 bound -= size
             elif factors[known[named]].levels:
-                raise CommandError(f"--constraint {text!r}: {named} is no number; {allowed} that are numbers")
+                raise CommandError(f"--constraint {text!r}: {named} has named levels; {allowed} that are numbers")
             else:
                 weights[known[named]] += size
             rest = rest[match.end() :]
@@ -216,7 +218,7 @@ def checked_name(name: str, where: str) -> str:
             f"{where}: {name!r}; allowed: up to 60 letters, digits, _ and -, beginning with a letter or _"
         )
     if name in RESERVED:
-        raise StudyFileError(f"{where}: {name!r} is a column of the sheet itself; allowed: another name")
+        raise StudyFileError(f"{where}: {name!r} is a reserved column name; allowed: another name")
     return name
 
 
@@ -233,7 +235,9 @@ def _factor(table: FactorTable, where: str) -> DesignFactor:
     if table.levels:
         for key, value in (("low", table.low), ("high", table.high), ("reference", table.reference)):
             if value is not None:
-                raise StudyFileError(f"{where}.{key}: {value:g} beside levels ({table.name}); allowed: one of them")
+                raise StudyFileError(
+                    f"{where}.{key}: {value:g} together with levels ({table.name}); allowed: one or the other"
+                )
         return make_names(table.name, table.levels, where)
     if table.low is None or table.high is None:
         key = "low" if table.low is None else "high"

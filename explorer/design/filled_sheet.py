@@ -92,8 +92,8 @@ class Sheet:
             return ""
         if text.lower() in FLAGS or not math.isnan(self.table.number(text)):
             raise CommandError(
-                f"{self.path}, line {self.lines[position]}, column {EXCLUDED}: {short(text)} is no reason; "
-                "allowed: words that say why the run is left out, or an empty cell"
+                f"{self.path}, line {self.lines[position]}, column {EXCLUDED}: {short(text)} is not a reason; "
+                "allowed: words that state why the run is left out, or an empty cell"
             )
         return text
 
@@ -121,7 +121,7 @@ def read_sheet(path: Path, factors: Sequence[DesignFactor] = ()) -> Sheet:
     design, declared = _declarations(path, table)
     known = tuple(factors) or declared
     if not known:
-        raise CommandError(f"{path}: no line '# factor | name | low | high | unit'; allowed: with --factors FILE")
+        raise CommandError(f"{path}: no line '# factor | name | low | high | unit'; needed without it: --factors FILE")
     if not table.rows:
         raise CommandError(f"{path}: no header line with the names of the columns")
     (_, names), *runs = table.rows
@@ -172,7 +172,7 @@ def _declarations(path: Path, table: CellTable) -> tuple[str, tuple[DesignFactor
 def _declared(path: Path, line: int, parts: list[str]) -> DesignFactor:
     where = f"{path}, line {line}"
     if len(parts) not in (3, 4, 5):
-        raise CommandError(f"{where}: allowed is '# factor | name | low | high | unit | reference'")
+        raise CommandError(f"{where}: allowed: '# factor | name | low | high | unit | reference'")
     numbers: list[float] = []
     for text in (*parts[1:3], *parts[4:]):
         try:
@@ -234,14 +234,16 @@ def runs_of(sheet: Sheet, response: str, only: Sequence[str] = (), block: str = 
     for option, column in (("--block", block), ("--random", random)):
         if column and (column not in sheet.columns or column in (response, *(factor.name for factor in factors))):
             offered = ", ".join(name for name in sheet.responses if name != response) or "none"
-            raise CommandError(f"{sheet.path}: {option} {column}: no column of blocks; the other columns are {offered}")
+            raise CommandError(
+                f"{sheet.path}: {option} {column}: no such column for blocks; the other columns are {offered}"
+            )
     _check_words(sheet, response)
     if response not in sheet.responses:
         offered = ", ".join(sheet.responses) or "none"
         raise CommandError(f"{sheet.path}: --response {response}: no such column; the responses are {offered}")
     values = [sheet.number(position, response) for position in range(len(sheet.cells))]
     if all(map(math.isnan, values)):
-        raise CommandError(f"{sheet.path}, column {response}: every cell is empty; fill in what came out of the runs")
+        raise CommandError(f"{sheet.path}, column {response}: every cell is empty; fill in the results of the runs")
     excluded = [k for k, value in enumerate(values) if sheet.why_excluded(k) and not math.isnan(value)]
     for k in excluded:
         values[k] = math.nan
@@ -303,7 +305,9 @@ def finished_runs(sheet: Sheet, responses: Sequence[str]) -> FinishedRuns:
         if not sheet.why_excluded(k) and any(row[sheet.columns[name]] not in EMPTY_CELLS for name in known)
     ]
     if not filled:
-        raise CommandError(f"{sheet.path}: no run with a result in {', '.join(responses)}; allowed: a filled sheet")
+        raise CommandError(
+            f"{sheet.path}: no run with a result in {', '.join(responses)}; allowed: a sheet with results"
+        )
     natural = np.array([_levels(sheet, sheet.factors, k, needed=True) for k in filled])
     cells = []
     for k in filled:

@@ -111,13 +111,13 @@ class RunPlan:
 def make_plan(order: DesignOrder, file: FactorsFile) -> RunPlan:
     """The design of an order; raises CommandError or StatisticsError for options that do not fit it."""
     if order.design not in DESIGNS:
-        raise CommandError(f"design {order.design[:40]!r}: allowed are {', '.join(DESIGNS)}")
+        raise CommandError(f"design {order.design[:40]!r}; allowed: {', '.join(DESIGNS)}")
     design, seed = DESIGNS[order.design], _first(order.seed, file.seed, 1)
     replicates = _first(order.replicates, file.replicates, 1)
     kept = FinishedRuns(np.zeros((0, len(file.factors))), (), np.zeros(0))
     if order.augment is not None:
         if "kept" in design.options and (replicates > 1 or order.blocks):
-            raise CommandError("--augment: the finished runs stay as they are; allowed: --replicates 1, no --blocks")
+            raise CommandError("--augment: the finished runs are not changed; allowed: --replicates 1 and no --blocks")
         kept = finished_runs(read_sheet(order.augment, file.factors), file.responses)
     # Blocks of whole replicates hold every row equally often, in any design.
     of_replicates = order.blocks if order.blocks is not None and replicates % order.blocks == 0 else None
@@ -141,7 +141,9 @@ def make_plan(order: DesignOrder, file: FactorsFile) -> RunPlan:
     asked = (*options.given(), *(["model"] if order.model is not None else []))
     _refuse_foreign_options(design, options, asked)
     if order.blocks and BLOCK in (*(factor.name for factor in file.factors), *file.responses):
-        raise CommandError(f"--blocks: the sheet's column {BLOCK!r} is a name of the factors file; allowed: another")
+        raise CommandError(
+            f"--blocks: the sheet needs the column {BLOCK!r}, a name in the factors file; rename it there"
+        )
     if "centre" in design.options:
         options = replace(options, centre=file.centre if order.centre is None else order.centre)
     if design.mixture:
@@ -150,7 +152,7 @@ def make_plan(order: DesignOrder, file: FactorsFile) -> RunPlan:
     _refuse_levels_between_names(design, file, points.coded)
     rows = len(points.coded)
     if rows * replicates > MOST_RUNS:
-        raise CommandError(f"{rows} rows × {replicates} replicates: allowed are {MOST_RUNS} runs")
+        raise CommandError(f"{rows} rows × {replicates} replicates; allowed: up to {MOST_RUNS} runs")
     every = np.array([(row, replicate) for replicate in range(replicates) for row in range(rows)])
     if of_replicates:
         block = every[:, 1] * of_replicates // replicates
@@ -181,12 +183,13 @@ def _require_parts(file: FactorsFile) -> None:
     rooms = [factor.high - factor.low for factor in file.factors]
     named = [factor.name for factor in file.factors if factor.levels]
     if named:
-        raise CommandError(f"mixture: {named[0]} is no number; allowed: parts with low and high")
+        raise CommandError(f"mixture: {named[0]} has named levels; allowed: parts with low and high")
     if max(rooms) - min(rooms) > 1e-9 * max(rooms):
         listed = ", ".join(f"{factor.name} {room:g}" for factor, room in zip(file.factors, rooms, strict=True))
         raise CommandError(
-            f"mixture: high less low is not the same for every part ({listed}); allowed: the whole less the sum of all "
-            "lows, as of 0 and 1, or of 0 and 100"
+            f"mixture: high minus low differs between the parts ({listed}); allowed: for every part the whole minus "
+            "the "
+            "sum of all lows, as with 0 and 1, or with 0 and 100"
         )
 
 
@@ -196,8 +199,8 @@ def _refuse_levels_between_names(design: Design, file: FactorsFile, coded: Array
         if factor.levels and not np.isclose(column[:, None], factor.codes, atol=1e-9).any(axis=1).all():
             takers = ", ".join(other.name for other in DESIGNS.values() if "levels" in other.options)
             raise CommandError(
-                f"{design.name}: runs {factor.name} between or beyond its levels {', '.join(factor.levels)}; "
-                f"allowed: {takers}, or two levels in a two-level design"
+                f"{design.name}: needs levels of {factor.name} other than {', '.join(factor.levels)}; "
+                f"allowed: {takers}, or a two-level design with two levels"
             )
 
 
@@ -219,9 +222,9 @@ def _refuse_foreign_options(design: Design, options: DesignOptions, asked: Itera
         if name not in design.options:
             takers = ", ".join(other.name for other in DESIGNS.values() if name in other.options)
             other = f", or {options.blocks} replicates of any design" if name == "blocks" else ""
-            raise CommandError(f"{OPTIONS[name]}: is not for {design.name}; it belongs to {takers}{other}")
+            raise CommandError(f"{OPTIONS[name]}: is not for {design.name}; allowed with: {takers}{other}")
     if options.runs is not None and options.runs > MOST_RUNS:
-        raise CommandError(f"--runs {options.runs}: allowed are {MOST_RUNS}")
+        raise CommandError(f"--runs {options.runs}; allowed: up to {MOST_RUNS}")
 
 
 def _first(*values: int | None) -> int:

@@ -113,7 +113,7 @@ def _poured(
         poured += 1
         if left % SAID_EVERY == 0:
             elapsed = time.monotonic() - began
-            say(f"{elapsed:.0f} s: {what}, {left} pours to come{time_left(left * elapsed / poured)}")
+            say(f"{elapsed:.0f} s: {what}, {left} pours left{time_left(left * elapsed / poured)}")
 
     with ExitStack() as stack:
         store = Store(order.store or default_store())

@@ -138,7 +138,7 @@ def read_next(folder: Path) -> NextFolder:
         for table in sorted(folder.glob("*.csv")):
             if not _holds_value(table):
                 raise CommandError(
-                    f"{table}: value: none is filled in yet; take the # off a row and write what was measured"
+                    f"{table}: value: none is filled in yet; remove the # from a row and enter the measured value"
                 ) from None
         raise
 
@@ -196,7 +196,7 @@ def _changed_entry(
         kind, _, key = path.partition(".")
         if path in calibrated:
             raise CommandError(
-                f"{path}: is calibrated, and {suggestion.experiment.name!r} sets it; allowed: one of both"
+                f"{path}: is calibrated, but {suggestion.experiment.name!r} sets it; allowed: one of the two"
             )
         if kind == "rig":
             rig[key] = new

@@ -97,7 +97,7 @@ class DiagnoseProcess(OrderedCommands[Question]):
         self._process.refuse_while_running()
         out = self.stopped(checked)
         if out is None:
-            raise BackgroundError(f"no diagnosis of {Path(checked.data).name} has been stopped before its end")
+            raise BackgroundError(f"no diagnosis of {Path(checked.data).name} was stopped before its end")
         self._go_on_in(out, self._arguments(checked, out))
 
     def stopped(self, question: Question) -> Path | None:

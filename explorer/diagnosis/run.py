@@ -151,10 +151,10 @@ def run_diagnose(order: DiagnoseOrder, reporter: Reporter) -> DiagnosisResult:
     earlier = NOTHING_BEFORE
     if order.given is not None:
         if order.given.resolve() == order.out.resolve():
-            raise CommandError(f"--given {order.given}: is --out too; allowed: another folder")
+            raise CommandError(f"--given {order.given}: is the same folder as --out; allowed: another one")
         earlier = earlier_answer(order.given, order.folder)
     if set(order.effects or EFFECTS) <= set(earlier.given):
-        raise CommandError("--effects: all of them are in the model by --given; allowed: others too")
+        raise CommandError("--effects: all of them are already in the model by --given; allowed: at least one other")
     # The executor before anything is in the folder: perhaps no scheduler answers.
     with kept_for_one(order.out), executor(order.threads, order.scheduler) as pool:
         reporter.begin(order.out, order.resume)
@@ -210,12 +210,15 @@ def _run(
     if missing:
         say(missing)
     if result.kind == "ambiguous" and not order.plan_next:
-        say("what to measure next: not looked for, as asked; the same with --resume and without --no-next adds it")
+        say(
+            "what to measure next: not searched for, as asked; the same command with --resume and without --no-next "
+            "adds it"
+        )
     if found.suggestions:
         following = order.out / "next"
         if (following / ORDER).is_file():  # of a run that was stopped later, or one that is gone on with
             same = "" if asks_for(following, found.suggestions[0]) else "; it is not what this answer asks for"
-            say(f"{following}: is there already and stays as it is, for somebody may have filled it in{same}")
+            say(f"{following}: exists already and is not changed, as it may be filled in{same}")
         else:
             joined_names = [condition.name for condition in found.conditions]
             write_next(following, order.folder, as_declared, found.suggestions[0], order.given, joined_names)
@@ -252,7 +255,7 @@ def _finished(order: DiagnoseOrder) -> DiagnosisResult | None:
     usual = DiagnosisOrder(result.order.out, (), None, 0, None)
     known = replace(result.order, follow_up=_absolute(result.order.follow_up), given=_absolute(result.order.given))
     if Path(result.data.folder).absolute() != order.folder.absolute() or asked not in (usual, known):
-        raise CommandError(f"--out {order.out}: holds the answer to another question")
+        raise CommandError(f"--out {order.out}: holds the answer to another question; name another folder")
     return result
 
 
@@ -266,7 +269,8 @@ def earlier_answer(folder: Path, data: Path) -> Earlier:
     given = result.handed_on()
     if not given:
         raise CommandError(
-            f"--given {folder}: {result.verdict}; allowed: a diagnosis in which an effect has {result.threshold:.0%}"
+            f"--given {folder}: {result.verdict}; allowed: a diagnosis in which one effect has a probability of at "
+            f"least {result.threshold:.0%}"
         )
     follow_ups: list[Measurement] = []
     seen = {folder.resolve()}
@@ -279,7 +283,7 @@ def earlier_answer(folder: Path, data: Path) -> Earlier:
             return Earlier(given, tuple(follow_ups))
         before = Path(result.order.given).resolve()
         if before in seen:
-            raise CommandError(f"--given {folder}: goes on from {before}, which goes on from itself")
+            raise CommandError(f"--given {folder}: continues {before}, which continues itself")
         seen.add(before)
         result = _earlier_result(before)
 

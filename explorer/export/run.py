@@ -98,7 +98,7 @@ def _run(command: list[str], folder: Path, environment: dict[str, str], limit: f
     try:
         output, _ = process.communicate(timeout=limit)
     except subprocess.TimeoutExpired as late:
-        raise PeerTimeout(f"{name}: stopped after {limit:g} s, which it had not ended by") from late
+        raise PeerTimeout(f"{name}: stopped after {limit:g} s, the limit") from late
     finally:
         # Not yet reaped, so the number is still that of this group.
         if process.returncode is None:

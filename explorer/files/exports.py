@@ -51,9 +51,9 @@ def bodies_stl(frame: Frame, scene: Scene) -> bytes:
     chosen = np.flatnonzero(frame.inside)
     triangles = sum(len(shapes[frame.component[k]].faces) for k in chosen)
     if not triangles:
-        raise CommandError("STL: no body is in the domain yet")
+        raise CommandError("STL: no body has entered yet")
     if triangles > MOST_TRIANGLES:
-        raise CommandError(f"STL: {triangles} triangles; allowed are up to {MOST_TRIANGLES}")
+        raise CommandError(f"STL: {triangles} triangles; allowed: up to {MOST_TRIANGLES}")
     corners = [_placed(shapes[frame.component[k]], frame, int(k)) for k in chosen]
     vertices = np.concatenate(corners).reshape(-1, 3)
     mesh = trimesh.Trimesh(MM * vertices, np.arange(len(vertices)).reshape(-1, 3), process=False)

@@ -106,7 +106,7 @@ def measured_file(name: str, content: bytes, pixel: float | None = None) -> Meas
     readers = {".npz": _scan, ".csv": _points} | dict.fromkeys(PICTURES, partial(_photograph, pixel=pixel))
     read = readers.get(Path(name).suffix.lower())
     if read is None:
-        raise CommandError(f"{name[:80]}: allowed are files ending in {', '.join(SUFFIXES)}")
+        raise CommandError(f"{name[:80]}: allowed: files ending in {', '.join(SUFFIXES)}")
     try:
         return read(name[:80], content)
     except CommandError as error:
@@ -133,7 +133,7 @@ def scanned_spheres(content: bytes) -> Spheres:
     _check_places(centre, "xyz")
     _check_places(radius, "radius")
     if (radius <= 0.0).any():
-        raise CommandError("radius: one is not positive")
+        raise CommandError("radius: every radius must be positive")
     return Spheres(centre, radius, np.zeros(len(radius), dtype=np.int32))
 
 
@@ -144,7 +144,7 @@ def _points(name: str, content: bytes) -> MeasuredCurve:
     table = csv_table(text, lambda line, what: CommandError(f"line {line}: {what}"))
     line, head = table.rows[0] if table.rows else (1, [])
     if head != COLUMNS:
-        raise CommandError(f"line {line}: {','.join(head)[:40]!r}; allowed is a line u_m,z_m, and points below it")
+        raise CommandError(f"line {line}: {','.join(head)[:40]!r}; allowed: a line u_m,z_m, and points below it")
     points = np.array([_point(table, line, cells) for line, cells in table.rows[1:]])
     if not 2 <= len(points) <= MOST_POINTS:
         raise CommandError(f"{len(points)} points; allowed: 2 … {MOST_POINTS}")

@@ -161,7 +161,7 @@ def shaped_source(present: Scene, body: str, name: str, content: bytes, unit: st
     The member spheres are fitted here, which takes seconds.
     """
     if body not in [one.name for one in present.bodies]:
-        raise CommandError(f"body {body[:60]!r}: there is none of that name")
+        raise CommandError(f"body {body[:60]!r}: no such body")
 
     def shaped(mesh: Path) -> Scene:
         solid = mesh_solid(mesh, unit, unit_input="unit")
@@ -250,7 +250,7 @@ def place(name: str, content: bytes, folder: Path, suffixes: Sequence[str]) -> P
     """Where an upload is put in ``folder``, which is there afterwards; CommandError for another kind or size."""
     suffix = Path(name).suffix.lower()
     if suffix not in suffixes:
-        raise CommandError(f"{label(name)}: allowed are files ending in {', '.join(suffixes)}")
+        raise CommandError(f"{label(name)}: allowed: files ending in {', '.join(suffixes)}")
     if not 0 < len(content) <= MOST_FILE_BYTES:
         raise CommandError(f"{name[:80]}: {len(content)} bytes; allowed: up to {MOST_FILE_BYTES}")
     folder.mkdir(parents=True, exist_ok=True)

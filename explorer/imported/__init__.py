@@ -42,7 +42,7 @@ def write_imported(folder: Path, name: str, program: str, file: Path) -> tuple[P
     except OSError as error:
         raise CommandError(f"{file}: {error.strerror or error}") from None
     if not found.materials:
-        raise CommandError(f"{file}: says no material in {program}'s words; needed: {NEEDED[program]}")
+        raise CommandError(f"{file}: no material found in {program}'s syntax; needed: {NEEDED[program]}")
     try:
         scene = scene_of(found, path)
     except ParameterError as error:

@@ -79,7 +79,8 @@ def read_edem(file: Path) -> Found:
             young, follows = entry.pop("youngs_modulus"), 2.0 * entry["shear_modulus"] * (1.0 + entry["poisson_ratio"])
             if not math.isclose(young, follows, rel_tol=ROUNDED):
                 raise CommandError(
-                    f"{file}: {name}: Young's modulus {young:g}: is not 2 G (1 + nu); allowed: {follows:g}, or none"
+                    f"{file}: {name}: Young's modulus {young:g}: differs from 2 G (1 + nu); allowed: {follows:g}, or "
+                    "no Young's modulus"
                 )
     if any("shear_modulus" in entry for entry in found.materials.values()):
         found.notes.append("elasticity: G and nu as there, so E = 2 G (1 + nu)")

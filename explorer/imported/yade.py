@@ -115,8 +115,9 @@ def _frict_mat(
             value = number(words[key], names)
         except ValueError as error:
             raise CommandError(
-                f"{file}: line {call.lineno}: FrictMat({key}={error}): not known without running the script; allowed: "
-                "numbers, names of numbers, arithmetic"
+                f"{file}: line {call.lineno}: FrictMat({key}={error}): cannot be evaluated without running the "
+                "script; allowed: "
+                "numbers, variables that hold numbers, arithmetic"
             ) from None
         if ours:
             entry[ours] = value
@@ -197,7 +198,7 @@ def _deck(folder: Path) -> Found:
     try:
         deck, law = read_deck(folder), json.loads((folder / LAW).read_text(encoding="utf-8"))
     except (ValueError, KeyError, TypeError):
-        raise CommandError(f"{folder}: {DECK} and {LAW} are not those of an export") from None
+        raise CommandError(f"{folder}: {DECK} and {LAW} are not from an export of this program") from None
     names = [clump.name for clump in deck.clumps]
     found.wall = "wall" if "wall" not in names else "wall_"
     found.materials[found.wall] = {

@@ -128,7 +128,7 @@ def measured_source(present: Scene, result: LabResult, folder: Path) -> SceneSou
     """
     part = part_table(result)
     if not set(part) - {"format", "measured"}:
-        raise CommandError(f"{result.test}: gives no parameter of a material")
+        raise CommandError(f"{result.test}: the test gives no material parameter")
     scene = with_part(present, part)
     text = material_toml(scene, f"{present.title}, with {result.test} measured. SI; origins: [measured] below.")
     text += measured_text(part.get("measured", {}))
@@ -187,7 +187,9 @@ def _of_bodies(bodies: Sequence[PartBody]) -> dict[str, Any]:
     for body in bodies:
         said = body.model_dump(exclude={"name"}, exclude_unset=True)
         if not said:
-            raise ParameterError(f"body: {body.name}; allowed: a mass_fraction, or {' and '.join(SIZES)} beside a name")
+            raise ParameterError(
+                f"body: {body.name}; allowed: a name with a mass_fraction, or with {' and '.join(SIZES)}"
+            )
         if body.mass_fraction is not None and body.mass_fraction > 1.0:
             raise ParameterError(f"body: {body.name}: mass_fraction {body.mass_fraction:g}; allowed: 0 … 1")
         found |= {f"body.{body.name}.{key}": value for key, value in said.items()}

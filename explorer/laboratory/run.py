@@ -130,19 +130,19 @@ def _check(order: LabOrder) -> None:
         _check_template(order)
         return
     if order.file is None and not order.bias:
-        raise CommandError("FILE.csv is missing; without readings only --bias and --template have something to show")
+        raise CommandError("FILE.csv is missing; without readings only --bias and --template are allowed")
     if order.file is None and any(
         (order.simulate, order.out, order.figure, order.report, order.compression, order.left_out)
     ):
         raise CommandError("--simulate, --out, --plot, --report, --compression and --leave-out need readings: FILE.csv")
     if order.compression is not None and order.test != "shear":
-        raise CommandError("--compression: belongs to the test shear; both moduli give Poisson's ratio")
+        raise CommandError("--compression: allowed only with the test shear; both moduli give Poisson's ratio")
     if order.left_out and order.test != "composition":
-        raise CommandError("--leave-out: belongs to the test composition")
+        raise CommandError("--leave-out: allowed only with the test composition")
     if order.figure and order.test not in ("compression", "shear"):
-        raise CommandError("--plot: draws force–displacement curves; allowed with compression and shear")
+        raise CommandError("--plot: draws force–displacement curves; allowed only with compression and shear")
     if order.material is not None and not order.simulate:
-        raise CommandError("--material: is what --simulate runs with")
+        raise CommandError("--material: allowed only with --simulate")
     if order.bias:
         bias_table(order.test)  # refuses a test without one
     if order.simulate:
@@ -159,7 +159,7 @@ def _check_template(order: LabOrder) -> None:
     """A template is made of nothing but the test's name."""
     others = (order.file, order.compression, order.left_out, order.figure, order.report, order.material)
     if any(others) or order.simulate or order.bias:
-        raise CommandError("--template: makes an empty sheet; allowed beside it: --out FILE.csv, --json")
+        raise CommandError("--template: makes an empty sheet; allowed with it: --out FILE.csv, --json")
     if order.out:
         check_new_file(order.out, ".csv")
 

@@ -219,10 +219,10 @@ def specimen(scene: Scene, of: tuple[str, ...]) -> tuple[Body, str]:
     bodies = {name: body for body in reversed(scene.bodies) for name in (body.material, body.name)}
     one, other = of if len(of) == 2 else (of[0], scene.rig.wall)
     if not {*of} & {*bodies}:
-        raise CommandError(f"--simulate: {'-'.join(of)}: no body of that name; there are {', '.join(bodies)}")
+        raise CommandError(f"--simulate: {'-'.join(of)}: no such body; allowed: {', '.join(bodies)}")
     if one not in bodies:
         one, other = other, one
     wall = other if other in {m.name for m in scene.materials} else bodies[other].material
     if len(of) == 2 and scene.contact_pair(bodies[one], wall) is not scene.pair(*of):
-        raise CommandError(f"--simulate: {'-'.join(of)}: a plate of {wall} would touch by another pair of the material")
+        raise CommandError(f"--simulate: {'-'.join(of)}: a plate of {wall} would use another pair of the material")
     return bodies[one], wall

@@ -72,7 +72,7 @@ class Session:
         if bodies > MAX_BODIES:
             path = "rig.mass" if "rig.mass" in parameters(scene) else "rig"
             raise ParameterError(
-                f"{path}: {poured_mass(scene):g} kg are {bodies} bodies; the live view holds at most {MAX_BODIES}"
+                f"{path}: {poured_mass(scene):g} kg is {bodies} bodies; allowed in the live view: up to {MAX_BODIES}"
             )
         self._source = source or self._source or SceneSource((), scene)
         self._generation += 1
@@ -137,7 +137,7 @@ class Session:
         known = parameters(scene)
         for path in values:
             if not known[canonical(scene, path)].live:
-                raise ParameterError(f"{path}: acts on restart only, not on a running pour")
+                raise ParameterError(f"{path}: takes effect on restart only, not during a pour")
         with_values(scene, dict(values))
         self._send(SetParameters(dict(values)))
 

@@ -93,7 +93,7 @@ def read_balance(path: Path) -> BalanceCurve:
         raise CommandError(f"{path}: {time.size} readings; allowed: {FEWEST} or more")
     if (behind := np.flatnonzero(np.diff(time) <= 0.0)).size:
         line = table.rows[int(behind[0]) + 2][0]
-        raise CommandError(f"{path}:{line}: time: does not grow; allowed: a later time in every row")
+        raise CommandError(f"{path}:{line}: time: does not increase; allowed: a later time in every row")
     change = float(np.median(_last(time, mass))) - mass[0]
     moved = np.flatnonzero(np.abs(mass - mass[0]) > ZERO_SHARE * abs(change))
     zero = float(np.median(mass[: max(1, int(moved[0]) if moved.size else mass.size)]))
@@ -102,14 +102,14 @@ def read_balance(path: Path) -> BalanceCurve:
     total = abs(total)
     if not total > 0.0 or np.ptp(_last(time, passed)) > LEVEL_SHARE * total:
         raise CommandError(
-            f"{path}: mass: no level end; allowed: readings until the flow has stopped, and over the last "
+            f"{path}: mass: not constant at the end; allowed: readings until the flow has stopped, with the last "
             f"{LEVEL_TIME:.0%} of the time within {LEVEL_SHARE:.0%} of the change"
         )
     low, high = (int(np.argmax(passed >= share * total)) for share in STEADY)
     if high - low < 2:
         raise CommandError(
             f"{path}: {high - low + 1} readings between {STEADY[0]:.0%} and {STEADY[1]:.0%} of the mass; allowed: 3 or "
-            "more, so a balance that reads faster"
+            "more, from a balance that reads faster"
         )
     rate, offset = np.polyfit(time[low : high + 1], passed[low : high + 1], 1)
     reached = (total - offset) / rate

@@ -100,7 +100,7 @@ def write_condition(folder: Path, asked: NewCondition, brought: Brought) -> Writ
 
 def _begun(folder: Path, asked: NewCondition, brought: Brought) -> WrittenCondition:
     if (asked.study is None) == (asked.material is None):
-        raise CommandError(f"{folder}: a new folder needs --study or --material, for what the data are held against")
+        raise CommandError(f"{folder}: a new folder needs --study or --material, the model to compare the data with")
     file = study_path(asked.study) if asked.study is not None else None
     named = str(read_toml(file)["material"]) if file else str(asked.material)
     scene = load_study(str(file)).scene if file else material_scene(named)
@@ -128,11 +128,11 @@ def _begun(folder: Path, asked: NewCondition, brought: Brought) -> WrittenCondit
 def _added(folder: Path, asked: NewCondition, brought: Brought) -> WrittenCondition:
     for option, given in (("--study", asked.study), ("--material", asked.material)):
         if given is not None:
-            raise CommandError(f"{option}: {folder / FILE} has its own; allowed: in a new folder")
+            raise CommandError(f"{option}: {folder / FILE} has its own; allowed only for a new folder")
     before = load_measurement(folder)
     names = [one.name for one in before.conditions]
     if asked.name in names or (folder / f"{asked.name}.csv").exists():
-        raise CommandError(f"--condition {asked.name}: is there already; allowed: a name other than {', '.join(names)}")
+        raise CommandError(f"--condition {asked.name}: exists already; allowed: a name other than {', '.join(names)}")
     scene = _set(before.conditions[0].scene, asked)
     found = read_brought(brought, scene)
     # Beside the folder, so that what its files name relative to it is found.
@@ -179,7 +179,7 @@ def _set(scene: Scene, asked: NewCondition) -> Scene:
     for setting in asked.settings:
         if not setting.strip().startswith(STATED):
             raise CommandError(
-                f"--set {setting}: no condition states it; allowed: rig.name, rig.…, {', '.join(STATED[1:])}"
+                f"--set {setting}: a condition cannot state it; allowed: rig.name, rig.…, {', '.join(STATED[1:])}"
             )
     return with_settings(scene, asked.settings)
 
@@ -296,7 +296,7 @@ def _check_new(folder: Path, condition: str, files: Sequence[Path]) -> None:
     for file in files:
         if (folder / file).exists():
             raise CommandError(
-                f"--condition {condition}: {folder / file} is there already; allowed: a name whose files are not"
+                f"--condition {condition}: {folder / file} exists already; allowed: a name whose files do not exist"
             )
 
 
@@ -315,7 +315,7 @@ def _loaded(made: Path, folder: Path) -> Measurement:
         if not one.observations:
             said = "; ".join(line for line in measurement.ignored if line.startswith(f"{one.name}: "))
             raise MeasurementError(
-                f"{folder}: condition {one.name!r} tells nothing ({said}); allowed: two pours or more, or "
+                f"{folder}: condition {one.name!r} has no usable value ({said}); allowed: two pours or more, or "
                 "--uncertainty NAME=VALUE"
             )
     return measurement
@@ -326,7 +326,7 @@ def _uncertainty(asked: NewCondition) -> dict[str, float | str]:
     for text in asked.uncertainty:
         name, _, given = (part.strip() for part in text.rpartition("="))
         if not name or not given:
-            raise CommandError(f"--uncertainty {text}: write observable=value, such as angle_of_repose_deg=1.5")
+            raise CommandError(f"--uncertainty {text}: allowed: observable=value, such as angle_of_repose_deg=1.5")
         try:
             found[name] = float(given)
         except ValueError:
@@ -338,7 +338,7 @@ def _with_uncertainty(text: str, asked: NewCondition, folder: Path) -> str:
     """``text`` with a table of what was stated, where it has none."""
     stated = _uncertainty(asked)
     if stated and "uncertainty" in tomlkit.parse(text):
-        raise CommandError(f"--uncertainty: {folder / FILE} has an [uncertainty]; allowed: to state it there")
+        raise CommandError(f"--uncertainty: {folder / FILE} has [uncertainty]; state it there")
     lines = [f"{toml_key(name)} = {toml_value(given)}" for name, given in stated.items()]
     return text + "\n".join(["\n[uncertainty]", *lines, ""]) if lines else text
 

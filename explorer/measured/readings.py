@@ -112,14 +112,14 @@ def read_brought(brought: Brought, scene: Scene) -> Readings:
     piles, faces = ((), brought.photographs) if drum else (brought.photographs, ())
     found = Readings(photographs=piles, faces=faces, scans=brought.scans)
     if brought.pixel is not None and not brought.photographs:
-        raise CommandError("--scale: belongs to --photo")
+        raise CommandError("--scale: allowed only with --photo")
     if brought.photographs and drum:
         _faces(brought, drum, found)
     elif brought.photographs:
         _check("--photo", any(name in given for name in ANGLES[1:]), scene)
         _photographs(brought, found)
     if drum and sum(given is not None for given in (brought.photographs or None, brought.angles, brought.drum)) > 1:
-        raise CommandError(f"--photo, --angles, --drum: each gives {DYNAMIC}; allowed: one of them for a set-up")
+        raise CommandError(f"--photo, --angles, --drum: each gives {DYNAMIC}; allowed: one of them for a condition")
     if brought.angles is not None:
         name = next((name for name in ANGLES if name in given), "")
         _check("--angles", bool(name), scene)
@@ -131,7 +131,7 @@ def read_brought(brought: Brought, scene: Scene) -> Readings:
         _check("--balance", FLOWED in given, scene)
         _balances(brought, scene, found)
     elif brought.starts or brought.lag is not None:
-        raise CommandError("--starts, --lag: belong to --balance")
+        raise CommandError("--starts, --lag: allowed only with --balance")
     if brought.scans:
         _check("--scan", pour_rig(scene).leaves_heap, scene)
         _scans(brought, found)
@@ -146,7 +146,10 @@ def read_brought(brought: Brought, scene: Scene) -> Readings:
 
 def _check(option: str, gives: bool, scene: Scene) -> None:
     if not gives:
-        raise CommandError(f"{option}: {scene.rig.name} gives {', '.join(observable_names(scene))}, and not that")
+        raise CommandError(
+            f"{option}: the rig {scene.rig.name} does not give this observable; it gives "
+            f"{', '.join(observable_names(scene))}"
+        )
 
 
 def _mean_and_sd(values: Sequence[float]) -> str:
@@ -168,7 +171,9 @@ def _photographs(brought: Brought, found: Readings) -> None:
 def _faces(brought: Brought, rig: RotatingDrum, found: Readings) -> None:
     """Every picture has to show the whole face of the drum, whose diameter is its scale."""
     if brought.pixel is not None:
-        raise CommandError("--scale: of pictures of a drum its diameter is the scale; state --set rig.diameter")
+        raise CommandError(
+            "--scale: not allowed for pictures of a drum, whose diameter is the scale; state --set rig.diameter"
+        )
     drums = _each(brought.photographs, read_drum)
     found.add(DYNAMIC, [one.angle_deg for one in drums])
     radius = rig.radius
@@ -255,7 +260,7 @@ def _balances(brought: Brought, scene: Scene, found: Readings) -> None:
     for curve in curves:
         if curve.total > poured and curve.whole(poured) == poured:
             raise CommandError(
-                f"--balance {curve.name}: {1e3 * curve.total:.4g} g passed, and {1e3 * poured:.4g} g are poured; state "
+                f"--balance {curve.name}: {1e3 * curve.total:.4g} g passed, but {1e3 * poured:.4g} g is poured; state "
                 "the mass, such as --set rig.mass=30g"
             )
         found.told.append(curve.line(poured, brought.lag))
@@ -307,7 +312,7 @@ def _scans(brought: Brought, found: Readings) -> None:
     scans: list[Scan] = []
     for file in brought.scans:
         if file.suffix.lower() not in known or not file.is_file():
-            raise CommandError(f"--scan {file}: allowed: a file that is there and ends in {', '.join(known)}")
+            raise CommandError(f"--scan {file}: allowed: an existing file ending in {', '.join(known)}")
         scans.append(read_scan(file, ScanSettings(unit=brought.scan_unit)))
     # A ring is known where every scan reaches around it.
     reach = min(
@@ -346,6 +351,7 @@ def _drum(text: str, scene: Scene, found: Readings) -> None:
     stated = by_name["froude_number"].summary.mean if "froude_number" in by_name else froude
     if abs(stated / froude - 1.0) > SAME:
         raise CommandError(
-            f"--drum {text}: a Froude number of {stated:.3g}, and that of the rig is {froude:.3g}; state the rig, such "
+            f"--drum {text}: its Froude number is {stated:.3g}, but that of the rig is {froude:.3g}; state the rig, "
+            "such "
             "as --set rig.speed_rpm=5 --set rig.diameter=84mm"
         )

@@ -89,7 +89,9 @@ def load(source: Source, settings: Settings | None = None, *, material: str | Pa
     """
     if isinstance(source, Scene):
         if material is not None:
-            raise ParameterError(f"material {material}: the scene has materials of its own; only a rig takes one")
+            raise ParameterError(
+                f"material {material}: the scene has its own materials; allowed only with the name of a rig"
+            )
         return with_settings(source, settings or {})
     scene, caution = named_scene(str(source), None if material is None else str(material))
     if caution:
@@ -264,7 +266,7 @@ def pour(source: Source, settings: Settings | None = None, *, seed: int = 1) -> 
 def _checked_seed(seed: int) -> int:
     # Neither NaN nor infinity is equal to what is left of it; a store keeps 64 bits with a sign.
     if not isinstance(seed, int | float | np.integer) or seed != seed // 1 or not 0 <= seed < 2**63:
-        raise ParameterError(f"seed {seed}: allowed: a whole number from 0 on, below 2^63")
+        raise ParameterError(f"seed {seed}: allowed: a whole number from 0, below 2^63")
     return int(seed)
 
 
@@ -278,7 +280,9 @@ def _checked_seeds(seeds: int | Iterable[int]) -> tuple[int, ...]:
         raise ParameterError(f"seeds {seeds}: allowed: a number of seeds from 1 on, or the seeds themselves")
     seed, times = Counter(numbers).most_common(1)[0]
     if times > 1:
-        raise ParameterError(f"seeds: {seed} is there {times} times, and would be one pour that counts as several")
+        raise ParameterError(
+            f"seeds: {seed} appears {times} times; allowed: each seed once, as equal seeds give the same pour"
+        )
     return numbers
 
 

@@ -80,7 +80,7 @@ def measure_order(
     if outline is not None:
         check_new_file(outline, suffix=".csv")
         if len(photos) != 1 or (scale_mm is None and reference_mm is None):
-            raise CommandError("--outline: of one picture of known scale; add --scale or --reference-length")
+            raise CommandError("--outline: needs one picture of known scale; add --scale or --reference-length")
     return MeasureOrder(
         pictures=tuple(asset_path("photographs", name) for name in photos),
         metres_per_pixel=None if scale_mm is None else 1e-3 * scale_mm,
@@ -106,7 +106,7 @@ def _numbers(text: str, option: str, form: str) -> tuple[float, ...]:
     except ValueError:
         numbers = ()
     if len(numbers) != n or not all(abs(number) <= FARTHEST for number in numbers):
-        raise CommandError(f"{option} {text}: allowed is {form}, in pixels of the picture")
+        raise CommandError(f"{option} {text}: allowed: {form}, in pixels of the picture")
     return numbers
 
 

@@ -80,7 +80,7 @@ def simulated_piles(source: str) -> SimulatedPiles:
     fitted = [(view, left, right) for view in views for left, right in [view.flanks] if left and right]
     sloping = [(view, (left, right)) for view, left, right in fitted if min(left.slope, right.slope) > 0.0]
     if not sloping:
-        raise CommandError(f"--from-simulation {source}: no view of it has two flanks to fit")
+        raise CommandError(f"--from-simulation {source}: none of its views has two flanks to fit")
     feet = np.array([flank_feet(flanks) for _, flanks in sloping])
     return SimulatedPiles(
         source=source,

@@ -162,7 +162,7 @@ def check_targets(targets: Sequence[Target]) -> None:
     """Raise CommandError unless photographs can give one of a study's ``targets``."""
     if all(target.observable != OBSERVABLE for target in targets):
         named = ", ".join(target.observable for target in targets)
-        raise CommandError(f"a photograph gives {OBSERVABLE}, and the study's target is {named}")
+        raise CommandError(f"a photograph gives {OBSERVABLE}, but the study's target is {named}")
 
 
 def load_target(folder: Path) -> PhotographedTarget | None:

@@ -158,7 +158,7 @@ def open_native(recording: Path) -> None:
     ended = subprocess.run([viewer_program(), str(recording)], env=quiet_environment(), check=False)
     if ended.returncode != 0:
         raise CommandError(
-            f"rerun's native viewer ended with {ended.returncode} (no screen?); "
+            f"rerun's native viewer ended with exit code {ended.returncode} (no screen?); "
             "without --native the recording opens in a browser"
         )
 

@@ -58,7 +58,7 @@ def load_scene(source: str, material: str | None = None) -> Scene:
         return scene if scene.rig.name == source else with_rig(scene, source)
     path = _file_of(source)
     if material is not None:
-        raise ParameterError(f"--material {material}: {path} has a material of its own; only a rig takes one")
+        raise ParameterError(f"--material {material}: {path} has its own material; allowed only with the name of a rig")
     table = read_toml(path)
     if is_material(table):
         return material_scene(str(path))
@@ -84,7 +84,7 @@ def _file_of(source: str) -> Path:
         if stem in shipped_assets(kind):
             return asset_path(kind, stem)
     if own.is_dir():
-        raise ParameterError(f"{source}: a folder without the result.json of a finished calibration")
+        raise ParameterError(f"{source}: the folder holds no result.json of a finished calibration")
     rigs, materials, studies, benchmarks, scenes = map(", ".join, (SOURCES, *map(shipped_assets, SHIPPED)))
     raise ParameterError(
         f"{source}: no such file, and no rig ({rigs}), shipped material ({materials}), study ({studies}), "

@@ -55,7 +55,7 @@ def pour_text(source: SceneSource, scene: Scene, seed: int, begun: SceneSource) 
 def read_pour(text: str, begun: SceneSource) -> LinkedPour:
     """What ``text`` asks for; it may be anything. Raises a ValueError of one line for what is not allowed."""
     if len(text) > LONGEST:
-        raise CommandError(f"link: {len(text)} characters; allowed are {LONGEST}")
+        raise CommandError(f"link: {len(text)} characters; allowed: up to {LONGEST}")
     fields = parse_qsl(text)
     given, changed = dict(fields), [value for key, value in fields if key == "set"]
     source = _source(given.get("pour", ""), given.get("material"), begun)
@@ -75,7 +75,7 @@ def _named(source: SceneSource, begun: SceneSource) -> list[tuple[str, str]]:
             return [("pour", rig), ("material", material)]
     if source == begun:
         return [("pour", _checksum(begun))]
-    raise CommandError(f"link: this scene is of a file of this machine, which a link does not hold; {INSTEAD}")
+    raise CommandError(f"link: this scene comes from a file on this machine, which a link cannot hold; {INSTEAD}")
 
 
 def _source(name: str, material: str | None, begun: SceneSource) -> SceneSource:
@@ -88,7 +88,7 @@ def _source(name: str, material: str | None, begun: SceneSource) -> SceneSource:
     elif name == _checksum(begun):
         return begun
     named = " ".join([name, material or ""]).strip()[:60]
-    raise CommandError(f"link: {named!r} is neither a shipped scene nor the one that this page began with")
+    raise CommandError(f"link: {named!r} is neither a shipped scene nor the one that this page started with")
 
 
 def _shipped() -> frozenset[str]:
@@ -112,7 +112,7 @@ def _refuse_files(scene: Scene, texts: Sequence[str]) -> None:
     known = parameters(scene)
     for path in table:
         if known[canonical(scene, path)].files:
-            raise CommandError(f"link: {path} is a file, which a link does not hold; {INSTEAD}")
+            raise CommandError(f"link: {path} is a file, which a link cannot hold; {INSTEAD}")
 
 
 def _number(given: Mapping[str, str], key: str, high: float) -> float:

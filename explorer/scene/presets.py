@@ -54,7 +54,7 @@ def preset_names(folder: Path) -> tuple[str, ...]:
 def preset_path(name: str, folder: Path) -> Path:
     """The file of one of :func:`preset_names`; CommandError for a name that is not among them."""
     if name not in preset_names(folder):
-        raise CommandError(f"preset {name[:60]!r}: there is none of that name")
+        raise CommandError(f"preset {name[:60]!r}: no such preset")
     own = name.removesuffix(OWN_MARK)
     return asset_path("presets", name) if own == name else folder / f"{own}.toml"
 
@@ -81,7 +81,7 @@ def preset_values(preset: Preset, scene: Scene) -> dict[str, float | str]:
     for pattern, raw in preset.values.items():
         paths = _matching(pattern, known) if "*" in pattern else [canonical(scene, pattern)]
         if not paths:
-            raise ParameterError(f"{preset.title}: {pattern}: no parameter of this scene is called so")
+            raise ParameterError(f"{preset.title}: {pattern}: no parameter of this scene has this name")
         found |= {path: known[path].check(raw) for path in paths}
     return found
 
@@ -95,7 +95,7 @@ def save_preset(name: str, folder: Path, changed: Iterable[Difference]) -> Path:
         raise CommandError(f"preset {name[:60]!r}: up to 40 letters, digits, blanks, - and _ are allowed")
     rows = [f"{toml_value(one.path)} = {toml_value(one.now)}" for one in changed]
     if not rows:
-        raise CommandError("preset: nothing differs from the default, there is nothing to save")
+        raise CommandError("preset: nothing differs from the default, so there is nothing to save")
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{name}.toml"
     heading = f'# Preset; values in SI.\nformat = 1\ntitle = {toml_value(name)}\nabout = "saved from the page"\n'

@@ -85,7 +85,9 @@ def command_line(source: SceneSource, scene: Scene, seed: int) -> str:
 def settings(source: SceneSource, scene: Scene) -> tuple[str, ...]:
     """Texts ``path=value`` that make the source's scene into exactly ``scene``; CommandError where there are none."""
     if not source.arguments:
-        raise CommandError("this scene came from no file that a command line could name; save the scene file instead")
+        raise CommandError(
+            "this scene does not come from a file that a command line can name; save the scene file instead"
+        )
     base = source.scene
     first: list[str] = []
     if scene.rig.name != base.rig.name:
@@ -95,7 +97,7 @@ def settings(source: SceneSource, scene: Scene) -> tuple[str, ...]:
         texts = [*first, *(setting_text(one) for one in chosen)]
         if _applied(source.scene, texts) == scene:
             return tuple(texts)
-    raise CommandError("this scene has other bodies, materials or texts than its source; save the scene file instead")
+    raise CommandError("this scene differs from its source in bodies, materials or titles; save the scene file instead")
 
 
 def setting_text(change: Difference) -> str:

@@ -55,7 +55,7 @@ def write_study(folder: Path, name: str, material: str | None) -> list[Path]:
         return [write_new(study, study_text(study, named, study_scene(material)))]
     own = folder / f"{name}.toml"
     if own.exists() and not is_material(read_toml(own)):
-        raise CommandError(f"{own} is there and is not a material; choose another name, or name one with --material")
+        raise CommandError(f"{own} exists and is not a material; choose another name, or name one with --material")
     written = [] if own.exists() else [write_material(folder, name)]
     return [*written, write_new(study, study_text(study, own.name, study_scene(str(own))))]
 

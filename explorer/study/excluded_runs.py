@@ -29,7 +29,9 @@ def load_excluded(folder: Path) -> tuple[ExcludedRun, ...]:
     excluded = []
     for line, cells in rows:
         if len(cells) != len(HEADER) or not cells[2].isdecimal() or not cells[3]:
-            raise CommandError(f"{file}, line {line}: allowed: a setting, its experiment or nothing, a seed, a reason")
+            raise CommandError(
+                f"{file}, line {line}: allowed: a setting, its experiment or an empty cell, a seed, a reason"
+            )
         excluded.append(ExcludedRun(cells[0], cells[1], int(cells[2]), cells[3]))
     return tuple(excluded)
 

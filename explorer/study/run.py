@@ -270,7 +270,9 @@ def _finished(out: Path, file: Path, profile: str) -> StudyResult | None:
         return None
     found = result.study
     if (Path(found.file).absolute(), found.profile.name) != (file.absolute(), profile):
-        raise CommandError(f"--out {out}: holds the result of {found.file}, profile {found.profile.name}")
+        raise CommandError(
+            f"--out {out}: holds the result of {found.file}, profile {found.profile.name}; name another folder"
+        )
     return result
 
 

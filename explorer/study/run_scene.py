@@ -21,12 +21,14 @@ def settings_of(result: AnyStudy, stage: str, label: str) -> Values:
     """What was changed against the study's scene in the setting ``label`` of ``stage``: path → SI or name."""
     begun = stages_with_runs(result)
     if stage not in begun:
-        raise CommandError(f"{stage}: no such stage in this study; there are {', '.join(begun) or 'none yet'}")
+        raise CommandError(f"{stage}: no such stage in this study; allowed: {', '.join(begun) or 'none yet'}")
     settings = {setting.label: setting.values for setting in result.settings_of(stage)}
     if not settings:
-        raise CommandError(f"{stage}: this result does not say what its runs were set to; an older version made it")
+        raise CommandError(
+            f"{stage}: this result lacks the settings of its runs, as an older version of the program made it"
+        )
     if label not in settings:
-        raise CommandError(f"{label!r} is no setting of the stage {stage}")
+        raise CommandError(f"{label!r} is not a setting of the stage {stage}")
     return settings[label]
 
 

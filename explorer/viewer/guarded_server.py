@@ -132,7 +132,7 @@ def check_token(host: str, token: str | None) -> None:
     """Raise PortError for a host that others can reach without a token, and for a token that can be guessed."""
     advice = f"a token of at least {SHORTEST_TOKEN} characters, such as {TOKEN_VARIABLE}=$(openssl rand -hex 16)"
     if token is None and not is_loopback(host):
-        raise PortError(f"--host {host}: anybody in the network could open this page; it needs {advice}")
+        raise PortError(f"--host {host}: anybody on the network could open this page; it needs {advice}")
     if token is not None and not (len(token) >= SHORTEST_TOKEN and token.isascii() and token.isprintable()):
         raise PortError(f"--token: {len(token)} characters; allowed: {advice}")
 

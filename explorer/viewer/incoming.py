@@ -295,7 +295,7 @@ class FilteredConnection:
         if size > MOST_UPLOAD_BYTES:
             raise Refusal(f"{name}: {size} bytes; allowed: up to {MOST_UPLOAD_BYTES}")
         if self.uploading + size > MOST_UPLOAD_BYTES or self._incoming.uploading + size > MOST_UPLOADING_BYTES:
-            raise Refusal(f"{name}: other files are on their way; send it when they are here")
+            raise Refusal(f"{name}: other files are being received; send it again afterwards")
         if not min(1, size) <= parts <= -(-size // SMALLEST_PART):
             return None
         self.sent = [*self.sent[-7:], start.transfer_uuid]

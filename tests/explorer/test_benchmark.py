@@ -267,4 +267,4 @@ def test_bad_options_are_one_line(options, words):
 def test_an_option_of_a_case_that_is_left_out_is_refused(option, value, case):
     result = CliRunner().invoke(app, ["bench", "--only", case, option, value])
     assert result.exit_code == 2
-    assert result.stderr.splitlines()[-1].startswith(f"error: {option}: belongs to the case")
+    assert result.stderr.splitlines()[-1].startswith(f"error: {option}: applies to the case")

@@ -58,15 +58,18 @@ AT = "tcp://127.0.0.1:9"
         (["cone"], ["cone", "funnel", "sunflower_extract"]),
         (["missing.toml"], ["missing.toml", "no such file"]),
         (["funnel", "--material", "gold"], ["gold", "sunflower_extract"]),
-        (["sunflower_extract", "--material", "sunflower_extract"], ["--material", "only a rig takes one"]),
+        (
+            ["sunflower_extract", "--material", "sunflower_extract"],
+            ["--material", "allowed only with the name of a rig"],
+        ),
         (["funnel", "--seed", "-1"], ["--seed", "0"]),
         (["funnel", "--replicates", "0"], ["--replicates", "1"]),
         (["funnel", "--record", "pour.txt"], ["pour.txt", ".rrd"]),
         (["funnel", "--record", "no/such/folder/pour.rrd"], ["pour.rrd", "no folder"]),
         ([], ["RIG_OR_FILE"]),
         (["funnel", "--frobnicate"], ["--frobnicate"]),
-        (["funnel", "--scheduler", AT, "--record", "pour.rrd"], ["--record", "leave --scheduler out"]),
-        (["funnel", "--scheduler", AT, "--checkpoint", "pour.npz"], ["--checkpoint", "leave --scheduler out"]),
+        (["funnel", "--scheduler", AT, "--record", "pour.rrd"], ["--record", "leave out --scheduler"]),
+        (["funnel", "--scheduler", AT, "--checkpoint", "pour.npz"], ["--checkpoint", "leave out --scheduler"]),
         (["inclined_plane", "--scheduler", AT], ["inclined_plane is a bench test", "--scheduler"]),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else None,
@@ -204,7 +207,7 @@ def test_serve_refuses_two_materials():
 
 @pytest.mark.parametrize("option", [("--seed", 1), ("--store", "runs.sqlite"), ("--set", "rig.mass=1g")])
 def test_a_recording_is_played_without_what_belongs_to_a_pour(option):
-    assert "leave the others out" in refused(explorer("serve", "--replay", "pour.rrd", *option))
+    assert "leave out the other options" in refused(explorer("serve", "--replay", "pour.rrd", *option))
 
 
 def test_a_material_of_one_s_own_is_served_with_a_study_of_its_own_factors(monkeypatch, tmp_path):

@@ -132,12 +132,12 @@ def test_nothing_is_poured_into_a_bench_test():
 
 @pytest.mark.parametrize("seed", [-1, 1.5])
 def test_a_seed_that_is_none_is_one_line(scene, seed):
-    with pytest.raises(ValueError, match=f"^seed {seed}: allowed: a whole number from 0 on, below 2\\^63$"):
+    with pytest.raises(ValueError, match=f"^seed {seed}: allowed: a whole number from 0, below 2\\^63$"):
         explorer.pour(scene, seed=seed)
 
 
 def test_a_material_needs_a_rig(scene):
-    with pytest.raises(ValueError, match="only a rig takes one"):
+    with pytest.raises(ValueError, match="allowed only with the name of a rig"):
         explorer.load(scene, material="nine_sphere_seed")
 
 
@@ -263,15 +263,15 @@ def test_what_is_in_the_store_is_not_poured_again(swept, scene, monkeypatch):
         ({}, {"observables": ["angle"]}, "observables: 'angle' is not one of angle_of_repose_deg, "),
         ({"rig.mass": np.int64(20)}, {}, "rig.mass: 20 kg"),
         ({"rig.mass": None}, {}, "rig.mass: None"),
-        ({}, {"seeds": [1, -1]}, "seed -1: allowed: a whole number from 0 on"),
+        ({}, {"seeds": [1, -1]}, "seed -1: allowed: a whole number from 0"),
         ({}, {"seeds": -1}, "seeds -1: allowed: a number of seeds from 1 on"),
         ({}, {"seeds": 0}, "seeds 0: allowed: a number of seeds from 1 on"),
         ({}, {"seeds": []}, r"seeds \[\]: allowed: a number of seeds from 1 on"),
         ({}, {"seeds": 2.5}, "seeds 2.5: allowed: a number of seeds from 1 on"),
-        ({}, {"seeds": [3, 4, 3]}, "seeds: 3 is there 2 times"),
-        ({}, {"seeds": [np.nan]}, "seed nan: allowed: a whole number from 0 on"),
-        ({}, {"seeds": [np.inf]}, "seed inf: allowed: a whole number from 0 on"),
-        ({}, {"seeds": [2**63]}, "seed 9223372036854775808: allowed: a whole number from 0 on, below"),
+        ({}, {"seeds": [3, 4, 3]}, "seeds: 3 appears 2 times"),
+        ({}, {"seeds": [np.nan]}, "seed nan: allowed: a whole number from 0"),
+        ({}, {"seeds": [np.inf]}, "seed inf: allowed: a whole number from 0"),
+        ({}, {"seeds": [2**63]}, "seed 9223372036854775808: allowed: a whole number from 0, below"),
         ({"rig.mass": []}, {}, "rig.mass: no values"),
         ({}, {"workers": 0}, "workers 0: allowed: a whole number of at least 1"),
         ({}, {"workers": -1}, "workers -1: allowed: a whole number of at least 1"),

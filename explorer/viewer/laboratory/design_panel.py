@@ -158,7 +158,7 @@ class DesignPanel(Panel):
         """Say what the chosen design is for, and ask for what it takes."""
         kind = str(self._kind.value)
         if kind not in DESIGNS:
-            raise CommandError(f"design {kind[:60]!r}: allowed are {', '.join(DESIGNS)}")
+            raise CommandError(f"design {kind[:60]!r}; allowed: {', '.join(DESIGNS)}")
         self._for.content = small_html(escape(DESIGNS[kind].doc))
         for name, field in self._fields.items():
             field.visible = name in DESIGNS[kind].options

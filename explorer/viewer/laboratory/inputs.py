@@ -103,7 +103,7 @@ def number_or_none(text: str, what: str) -> float | None:
         number = math.nan
     if not math.isfinite(number):
         point = " with a decimal point" if "," in text else ""
-        raise CommandError(f"{what} {text.strip()[:40]!r}: allowed is a number{point}, or nothing")
+        raise CommandError(f"{what} {text.strip()[:40]!r}; allowed: a number{point}, or an empty field")
     return number
 
 
@@ -114,7 +114,7 @@ def whole_or_none(text: str, what: str, least: int, most: int | None) -> int | N
         return None
     if number != int(number) or not least <= number <= (math.inf if most is None else most):
         allowed = f"{least} … {most}" if most is not None else f"{least} and more"
-        raise CommandError(f"{what} {text.strip()[:40]!r}: allowed is a whole number, {allowed}, or nothing")
+        raise CommandError(f"{what} {text.strip()[:40]!r}; allowed: a whole number, {allowed}, or an empty field")
     return int(number)
 
 

@@ -139,12 +139,12 @@ class MeasuredDataPanel(Panel):
     def _save(self) -> None:
         name = check_name(str(self._set.value).strip())
         if name in shipped_measurements():
-            raise CommandError(f"Data set: {name} comes with the program; choose another name")
+            raise CommandError(f"Data set: {name} is shipped with the program; choose another name")
         folder = self._uploads / name
         changes = tuple(str(self._changes.value).split())
         if any(change.startswith("rig.mesh") for change in changes):
             # A browser names no file of this machine.
-            raise CommandError("Set-up: rig.mesh: allowed: the study's own; another goes by the command line")
+            raise CommandError("Set-up: rig.mesh: allowed here: the study's own; use the command line for another")
         asked = NewCondition(
             name=str(self._condition.value).strip(),
             study=None if has_data(folder) else str(self._study),
@@ -162,7 +162,7 @@ class MeasuredDataPanel(Panel):
             raise CommandError(f"nothing was measured: give Angles, or {', '.join(kind.label for kind in KINDS)}")
         scale = positive(self._scale.value) if self._files[PHOTOGRAPHS] else None
         if ".csv" in angles or ".xlsx" in angles:
-            raise CommandError("Angles: allowed: numbers between commas; a file of them goes by the command line")
+            raise CommandError("Angles: allowed: numbers separated by commas; use the command line for a file")
         return Brought(
             photographs=tuple(self._files[PHOTOGRAPHS]),
             pixel=None if scale is None else 1e-3 * scale,

@@ -171,7 +171,7 @@ class PhotographPanel(Panel):
     def _keep(self, anew: bool) -> None:
         """Make the photograph that is shown the target, or one of its photographs."""
         if self._shown is None:
-            raise CommandError("read a photograph first: what is read becomes the target")
+            raise CommandError("read a photograph first; its angle of repose becomes the target")
         read, folder, study = self._shown, self._target.folder, self._study
 
         def keep() -> PhotographedTarget:

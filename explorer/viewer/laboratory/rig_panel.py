@@ -66,7 +66,7 @@ class RigPanel(Panel):
     def _chosen(self) -> str:
         rig = str(self._rig.value)
         if rig not in BENCH_RIGS:
-            raise CommandError(f"rig {rig[:60]!r}: allowed are {', '.join(BENCH_RIGS)}")
+            raise CommandError(f"rig {rig[:60]!r}; allowed: {', '.join(BENCH_RIGS)}")
         return rig
 
     def _run(self) -> None:

@@ -98,7 +98,7 @@ class CameraPanel:
     def _frame_pile(self, client: Any) -> None:
         points = self._pile()
         if not len(points):
-            raise InputError("frame the pile: no body is there yet")
+            raise InputError("frame the pile: no body has entered yet")
         self._leaves(client)
         camera = client.camera
         go_to_place(client, framing(points, camera.position - camera.look_at, camera.fov, aspect_of(camera)))

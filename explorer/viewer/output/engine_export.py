@@ -43,7 +43,7 @@ class EngineExport(Panel):
     def _export(self, client: Any) -> None:
         program, status, folder = str(self._program.value), self._session.status(), self._folder
         if program not in names():
-            raise CommandError(f"program {program[:40]!r}: allowed are {', '.join(names())}")
+            raise CommandError(f"program {program[:40]!r}; allowed: {', '.join(names())}")
         self._background.start(
             f"exporting for {program}",
             lambda: packed_export(kept_scene(status.scene, folder), program, status.seed),

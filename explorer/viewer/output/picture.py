@@ -62,7 +62,7 @@ def rendered(client: Any, scale: int) -> npt.NDArray[np.uint8]:
     """The scene as ``client`` sees it, ``scale`` times as large, as RGBA; CommandError where it is not drawn."""
     height, width = scale * client.camera.image_height, scale * client.camera.image_width
     if height < 1 or width < 1:
-        raise CommandError("picture: the browser has not told its size yet")
+        raise CommandError("picture: the browser has not sent its size yet")
     shrink = min(1.0, LARGEST_PICTURE[0] / height, LARGEST_PICTURE[1] / width)
     try:
         pixels: npt.NDArray[np.uint8] = client.get_render(

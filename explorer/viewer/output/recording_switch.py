@@ -117,7 +117,7 @@ class RecordingSwitch:
         if self.running:
             raise CommandError(f"recording: one is running, into {self._path}; stop it first")
         if kind not in (RRD, HTML):
-            raise CommandError(f"recording: {kind[:40]!r} is none; allowed: {RRD}, {HTML}")
+            raise CommandError(f"recording: unknown kind {kind[:40]!r}; allowed: {RRD}, {HTML}")
         self._folder.mkdir(parents=True, exist_ok=True)
         path = self._folder / f"pour-{datetime.now():%Y%m%d-%H%M%S-%f}{'.rrd' if kind == RRD else '.html'}"
         if kind == HTML:

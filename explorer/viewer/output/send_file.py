@@ -28,7 +28,7 @@ def send_files(client: Any, files: Mapping[str, bytes]) -> None:
     with buffer.buffer_lock:
         waiting = any(isinstance(one, _messages.FileTransferPart) for one in buffer.message_from_id.values())
     if waiting:
-        raise CommandError(f"{', '.join(files)}: this browser has not received the file before it yet")
+        raise CommandError(f"{', '.join(files)}: this browser has not yet received the previous file")
     for name, content in files.items():
         # At once: otherwise a person gets a link in a notification, and has to press it.
         client.send_file_download(name, content, save_immediately=True)
@@ -39,4 +39,4 @@ def refuse_large(files: Sequence[Path]) -> None:
     size = sum(file.stat().st_size for file in files)
     if size > MOST_SENT:
         listed = ", ".join(map(str, files))
-        raise CommandError(f"recording: {size / 1e6:.0f} MB are too much to send; fetch {listed}")
+        raise CommandError(f"recording: {size / 1e6:.0f} MB is too large to send; copy {listed}")

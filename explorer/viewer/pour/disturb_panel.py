@@ -95,7 +95,7 @@ def topmost(frame: Frame | None) -> int:
         near = frame.inside & (np.hypot(frame.position[:, 0], frame.position[:, 1]) < 0.1)
         if near.any():
             return int(np.argmax(np.where(near, frame.position[:, 2], -np.inf)))
-    raise CommandError("pull: no body is there yet")
+    raise CommandError("pull: no body has entered yet")
 
 
 def disturbance_html(tap: Tap, shake: Shake, present: str) -> str:

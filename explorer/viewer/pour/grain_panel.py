@@ -85,7 +85,7 @@ class GrainPanel(Panel):
     def _chosen(self) -> str:
         shape = str(self._shape.value)
         if shape not in SHAPES:
-            raise CommandError(f"shape {shape[:60]!r}: allowed are {', '.join(SHAPES)}")
+            raise CommandError(f"shape {shape[:60]!r}; allowed: {', '.join(SHAPES)}")
         return shape
 
     def _grain(self) -> Grain:

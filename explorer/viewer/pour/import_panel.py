@@ -49,7 +49,7 @@ class ImportPanel(Panel):
     def _take(self, sent: str, content: bytes) -> None:
         chosen = str(self._program.value)
         if chosen not in PROGRAMS:
-            raise CommandError(f"file of {chosen[:60]!r}: allowed are {', '.join(PROGRAMS)}")
+            raise CommandError(f"file of {chosen[:60]!r}; allowed: {', '.join(PROGRAMS)}")
         program, folder, uploads = PROGRAMS[chosen], self._folder, self._uploads
         name = str(self._name.value).strip() or label(Path(sent).stem)
 

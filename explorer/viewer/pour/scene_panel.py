@@ -109,7 +109,7 @@ class ScenePanel(Panel):
         rig = str(self._rig.value)
         material = str(self._file.value).strip() if self._material.value == OWN else str(self._material.value)
         if rig not in RIGS:
-            raise CommandError(f"rig {rig[:60]!r}: allowed are {', '.join(RIGS)}")
+            raise CommandError(f"rig {rig[:60]!r}; allowed: {', '.join(RIGS)}")
         if not material:
             raise CommandError("material: name a file, or choose one from the list")
         self._begin("reading the material", lambda: _checked(rig_source(rig, material)))
@@ -117,7 +117,7 @@ class ScenePanel(Panel):
     def _pour_prepared(self, name: str) -> None:
         self._prepared.value = NO_SCENE  # type: ignore[misc]
         if name not in shipped_assets("scenes"):
-            raise CommandError(f"scene {name[:60]!r}: there is none of that name")
+            raise CommandError(f"scene {name[:60]!r}: no such scene")
         self._begin("reading the scene", lambda: _checked(prepared_source(name)))
 
     def _take_material(self, name: str, content: bytes) -> None:
@@ -136,7 +136,7 @@ class ScenePanel(Panel):
         """Unit of a mesh's coordinates; None: that of its format."""
         unit = str(self._unit.value)
         if unit not in (UNIT_OF_FILE, *LENGTH_UNITS):
-            raise CommandError(f"unit {unit[:60]!r}: allowed are {', '.join(LENGTH_UNITS)}")
+            raise CommandError(f"unit {unit[:60]!r}; allowed: {', '.join(LENGTH_UNITS)}")
         return None if unit == UNIT_OF_FILE else unit
 
     def _begin(self, what: str, find: Callable[[], SceneSource]) -> None:

@@ -250,7 +250,7 @@ class DiagnosisPanel(Panel):
         """Another diagnosis of the same data, with the effect that this one found in the model."""
         result, folder = self._found(), self._chooser.folder or self._present()
         if not result.handed_on():
-            raise CommandError("no effect is as probable here as a name has to be: there is none to go on from")
+            raise CommandError("no effect here is probable enough to be named, so there is none to continue from")
         budget = self._candidates.budget
         self._diagnosis.start(Question(result.data.folder, self._candidates.effects, budget, str(folder)))
 
@@ -346,7 +346,7 @@ class CandidateEffects:
         """The effects that are asked about, () for all. Raises ValueError where none is left."""
         chosen = tuple(name for name, box in self._boxes.items() if box.value)
         if not chosen:
-            raise ValueError("effects: none is chosen; without a candidate there is nothing to ask")
+            raise ValueError("effects: none is chosen; at least one is needed")
         return () if len(chosen) == len(self._boxes) else chosen
 
     @property

@@ -200,7 +200,7 @@ class StudyPanel(Panel):
         """Leave runs of ``result`` out, which must be the one that is shown."""
         folder = self._chooser.folder or self._present()
         if result is not self._result or folder is None:
-            raise CommandError("another study is shown by now; open the table again")
+            raise CommandError("another study is now shown; open the table again")
         keep_excluded(folder, result, excluded)
         self._left_out = tuple(excluded)
 
@@ -215,7 +215,7 @@ class StudyPanel(Panel):
         scene, same = scene_of(result, *found)
         self._session.restart(scene, found[1].seed)
         if not same:
-            raise CommandError("program, study file or material have changed since that run: this pour may differ")
+            raise CommandError("program, study file or material has changed since that run: this pour may differ")
 
     def _record_order(self) -> tuple[Path, list[str]]:
         """Folder of the shown study, and its command line."""

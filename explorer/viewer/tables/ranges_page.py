@@ -73,7 +73,7 @@ def entered_ranges(rows: Sequence[RangeRow], sent: Sequence[object]) -> dict[str
     for row in rows:
         cells = found.get(row.name)
         if cells is None:
-            raise CommandError(f"{row.name}: is not in the table any more; open it again")
+            raise CommandError(f"{row.name}: is no longer in the table; open it again")
         low, high, measured = (_number(row.name, head, cells.get(key)) for key, head in ENTERED.items())
         ranges[row.name] = (low, high, measured)
     return ranges

@@ -172,7 +172,9 @@ def _check_column(sheet: Sheet, name: str, cells: Sequence[str]) -> None:
         return
     for line, cell in zip(sheet.lines, cells, strict=True):
         if cell not in EMPTY_CELLS and math.isnan(sheet.table.number(cell)):
-            raise CommandError(f"line {line}, {name}: {short(cell)} is not a number; allowed: a number, or nothing")
+            raise CommandError(
+                f"line {line}, {name}: {short(cell)} is not a number; allowed: a number, or an empty cell"
+            )
 
 
 def _check(content: bytes, table: Sequence[tuple[str, ...]]) -> None:

@@ -228,7 +228,7 @@ def test_what_cannot_be_answered_is_refused():
     coded, y, plot = split_plot(0)
     with pytest.raises(StatisticsError, match="without scatter"):
         fit_random(coded, (coded @ [1.0, 2])[:, None], region("AB"), TWO, blocks_of(plot), "linear")
-    with pytest.raises(CommandError, match="--target: is not for --random plot; allowed: --block plot"):
+    with pytest.raises(CommandError, match="--target: not allowed with --random plot; allowed: --block plot"):
         analysed("oats", response="Y", random="plot", target=100.0)
-    with pytest.raises(CommandError, match="--random Plot: no column of blocks; the other columns are B, plot"):
+    with pytest.raises(CommandError, match="--random Plot: no such column for blocks; the other columns are B, plot"):
         analysed("oats", response="Y", random="Plot")

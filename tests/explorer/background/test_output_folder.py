@@ -23,7 +23,7 @@ def test_a_second_command_is_refused_while_the_first_is_at_work_and_a_killed_one
     command = [sys.executable, "-c", AT_WORK, folder]
     first = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert first.stdout.readline() == "at work\n"
-    with pytest.raises(CommandError, match=f"--out {folder}: another command is at work there"), kept_for_one(folder):
+    with pytest.raises(CommandError, match=f"--out {folder}: another command is writing there"), kept_for_one(folder):
         pass
     first.kill()
     first.communicate()

@@ -271,8 +271,8 @@ def test_a_study_in_which_nothing_differs_has_no_empty_section(clean):
 
 
 SPOILED = {
-    "no target": ("study.toml", "[target]", "[aim]", "aim: unknown key; known here"),
-    "unknown key": ("study.toml", "n = 6", "number = 6", "target.number: unknown key; known here:"),
+    "no target": ("study.toml", "[target]", "[aim]", "aim: unknown key; allowed"),
+    "unknown key": ("study.toml", "n = 6", "number = 6", "target.number: unknown key; allowed:"),
     "format": ("study.toml", "format = 1", "format = 2", "format: this program reads format 1"),
     "not toml": ("study.toml", "[target]", "[target", "study.toml: Expected"),
     "no number": ("study.toml", "mean = 29.98", "mean = true", "target.mean: a number is needed, not True"),
@@ -285,7 +285,12 @@ SPOILED = {
     "ragged": ("shares.csv", "18.50", "18.50,1", "shares.csv, line 3: 3 cells; the table has 2 columns"),
     "formula": ("study.toml", "E / (2 * G) - 1", "open('x')", "is not arithmetic"),
     "name in a formula": ("study.toml", "(vx + vy) / v", "vz / v", "drop_test.formula: 'vz' is not known"),
-    "angle": ("study.toml", "plate_angle_deg = 45.0", "plate_angle_deg = 120", "120 is not allowed; allowed: 0 … 89"),
+    "angle": (
+        "study.toml",
+        "plate_angle_deg = 45.0",
+        "plate_angle_deg = 120",
+        "120 is not allowed; allowed: above 0, up to 89",
+    ),
     "restitution": ("drop.csv", "0.55", "5.5", "drop_test.column: a restitution of 5.5 is not allowed; allowed: 0 … 1"),
     "size": ("surface.csv", ",3", ",1e300\n#", "'1e300' is out of range"),
     "row": ("study.toml", 'pair = "0"', 'pair = "9"', "quoted 1.row: 0 rows of drop.csv fit; exactly one is needed"),
@@ -296,7 +301,7 @@ SPOILED = {
         "study.toml",
         'centre = "3"',
         'centre = "9"',
-        "surface.steps.centre: '9' is no step of the ascent; allowed: 1",
+        "surface.steps.centre: '9' is not a step of the ascent; allowed: 1",
     ),
     "significant": ("study.toml", '["F1"', '["G1"', "screening.significant: 'G1' is not one of F1"),
     "empty": ("shares.csv", None, "", "a line of column names and at least one row are needed"),

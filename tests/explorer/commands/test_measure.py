@@ -162,7 +162,7 @@ def test_a_scan_that_is_no_pile_is_refused(pile, tmp_path):
     flat = tmp_path / "flat.npz"
     np.savez(flat, xyz=np.array([[0.0, 0.0, 1e-3]]), radius=np.array([1e-3]), body=np.array([0]))
     line = refused(explorer("measure", pile, "--from-simulation", flat))
-    assert "no view of it has two flanks" in line
+    assert "none of its views has two flanks" in line
 
 
 def test_a_checkerboard_takes_the_lens_out(tmp_path):

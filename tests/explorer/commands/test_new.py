@@ -61,7 +61,7 @@ def test_a_file_that_is_not_a_material_is_not_taken_for_one(tmp_path, monkeypatc
     assert explorer("new", "study", "lentil").exit_code == 0
     (tmp_path / "lentil_study.toml").rename(tmp_path / "bean.toml")
     before = (tmp_path / "bean.toml").read_text()
-    assert "bean.toml is there and is not a material" in refused(explorer("new", "study", "bean"))
+    assert "bean.toml exists and is not a material" in refused(explorer("new", "study", "bean"))
     assert (tmp_path / "bean.toml").read_text() == before
     assert not (tmp_path / "bean_study.toml").exists()
 

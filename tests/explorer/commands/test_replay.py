@@ -69,7 +69,7 @@ def test_native_viewer_runs_without_statistics(recording, tmp_path, monkeypatch)
     assert (tmp_path / "call").read_text() == f"CI=1 {recording}\n"
     assert "CI" not in os.environ
     monkeypatch.setenv("EXIT_WITH", "3")
-    assert "ended with 3" in refused(explorer("replay", recording, "--native"))
+    assert "ended with exit code 3" in refused(explorer("replay", recording, "--native"))
 
 
 def test_replay_refuses_what_is_no_recording(recording, tmp_path):
@@ -82,7 +82,7 @@ def test_replay_refuses_what_is_no_recording(recording, tmp_path):
     assert "not empty" in refused(explorer("replay", recording, "--static", tmp_path))
     for option in (["--port", 9], ["--no-browser"]):
         for way in (["--native"], ["--static", tmp_path / "page"]):
-            assert "belong to the page" in refused(explorer("replay", recording, *way, *option))
+            assert "which open no page" in refused(explorer("replay", recording, *way, *option))
     assert [path.name for path in tmp_path.iterdir()] == ["text.rrd"]
 
 

@@ -75,4 +75,4 @@ def test_older_stores_beside_the_default_one_are_named(path, monkeypatch):
 @pytest.mark.parametrize("options", [(), ("--csv",)])
 def test_a_study_that_the_store_does_not_have_is_refused(path, options):
     told = refused(explorer("runs", "--store", path, "--study", "lentils", *options))
-    assert f"--study lentils: no runs of it in {path}" in told
+    assert f"--study lentils: no runs of this study in {path}" in told

@@ -123,7 +123,7 @@ def test_a_limit_that_is_not_reached_is_refused(tmp_path):
     cube = saved(trimesh.creation.box((5, 5, 5)), tmp_path / "cube.ply")
     result = explorer("shape", cube, "--most", 2, "--error", "0.01mm", "--out", tmp_path / "cube.toml")
     assert result.exit_code == 2
-    assert "--error 0.01 mm: not reached with 2 spheres, the least is 0.7" in result.stderr
+    assert "--error 0.01 mm: not reached with 2 spheres; the smallest is 0.7" in result.stderr
     assert not (tmp_path / "cube.toml").exists()
 
 

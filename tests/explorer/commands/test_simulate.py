@@ -134,7 +134,7 @@ def test_a_pour_that_diverges_leaves_a_scene_that_reproduces_it(tmp_path):
 
 
 def test_events_and_the_result_are_not_printed_together():
-    assert "name one of them" in refused(explorer("simulate", "funnel", "--json", "--events"))
+    assert "allowed: one of the two" in refused(explorer("simulate", "funnel", "--json", "--events"))
 
 
 @pytest.mark.parametrize(("failure", "code"), [(KeyboardInterrupt, 130), (RuntimeError, 1)])

@@ -74,7 +74,7 @@ def test_a_missed_limit_is_exit_code_one():
     [
         (["--only", "T9"], ["--only", "T9", "T1, T2", "slope"]),
         (["--json", "no/such/folder/x.json"], ["--json", "no folder"]),
-        (["--peer-limit", "5"], ["--peer-limit: belongs to --peers"]),
+        (["--peer-limit", "5"], ["--peer-limit: allowed only with --peers"]),
     ],
 )
 def test_refused(arguments, words, tmp_path, monkeypatch):
@@ -135,4 +135,4 @@ def test_an_economy_that_does_not_exist_is_refused():
 
 @pytest.mark.parametrize("option", [("--pours", "10"), ("--profile", "quick"), ("--change", "x"), ("--store", "s")])
 def test_what_belongs_to_an_economy_is_refused_without_one(option):
-    assert "belong to --economy" in refused(explorer("verify", "--only", "T1", *option))
+    assert "allowed only with --economy" in refused(explorer("verify", "--only", "T1", *option))

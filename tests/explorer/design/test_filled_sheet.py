@@ -191,7 +191,7 @@ def test_any_csv_is_read_with_a_factors_file_beside_it(tmp_path):
         ("time [h]", "temperature [°C]", "column 'temperature' appears twice"),
         ("| 150 | 180 |", "| 180 | 150 |", "line 1: factor.high: 150 is not above low 180"),
         ("| 150 | 180 |", "| low | 180 |", "line 1: 'low' is not a number"),
-        ("| 150 | 180 | °C | 160", "", "line 1: allowed is '# factor | name | low | high"),
+        ("| 150 | 180 | °C | 160", "", "line 1: allowed: '# factor | name | low | high"),
         ("# factor | time", "# factor | temperature", "'temperature' appears twice"),
     ],
 )
@@ -242,13 +242,13 @@ def test_a_response_that_would_be_markup_is_refused(tmp_path):
     [
         ('name = "time"', 'name = "ti me"', r"factor\[2\].name: 'ti me'; allowed"),
         ('name = "time"', 'name = "temperature"', "'temperature' appears twice"),
-        ('name = "time"', 'name = "run"', "is a column of the sheet itself"),
+        ('name = "time"', 'name = "run"', "is a reserved column name"),
         ("low = 0.1", "low = 0.3", r"factor\[2\].high: 0.3 is not above low 0.3"),
         ("low = 0.1", 'low = "0.1"', r"factor\[2\].low: '0.1' is not a number"),
         ("low = 0.1", "lower = 0.1", r"factor\[2\].lower: unknown key"),
         ('"strength"', '"strength [M|a]"', r"responses: unit of 'strength \[M\|a\]'; allowed"),
         ("low = 0.1", "", r"factor\[2\].low: missing"),
-        ("low = 0.1", 'levels = ["a"]\nlow = 0.1', r"factor\[2\].low: 0.1 beside levels \(time\); allowed: one"),
+        ("low = 0.1", 'levels = ["a"]\nlow = 0.1', r"factor\[2\].low: 0.1 together with levels \(time\); allowed: one"),
         ("low = 0.1\nhigh = 0.3", 'levels = ["a"]', r"factor\[2\].levels: \['a'\]; allowed: two or more different"),
         ("low = 0.1\nhigh = 0.3", 'levels = ["a", "7"]', r"factor\[2\].levels: '7'; allowed: names"),
         ('unit = "°C"', 'unit = "a|b"', r"factor\[1\].unit: 'a\|b'"),
@@ -276,9 +276,9 @@ def test_a_bad_factors_file_gets_one_line_with_its_key(tmp_path, old, new, messa
         (DesignOrder("lhs", generators=("C=AB",)), "--generator: is not for lhs"),
         (DesignOrder("factorial", generators=("C=AB",), fraction=1), "fraction: given together with"),
         (DesignOrder("factorial", alpha=Alpha.INSCRIBED), "--alpha: is not for factorial"),
-        (DesignOrder("lhs", runs=30_000), "--runs 30000: allowed"),
-        (DesignOrder("factorial", replicates=9000), "allowed are 20000 runs"),
-        (DesignOrder("lhs", blocks=2), "--blocks: is not for lhs; it belongs to .*, or 2 replicates of any design"),
+        (DesignOrder("lhs", runs=30_000), "--runs 30000; allowed: up to"),
+        (DesignOrder("factorial", replicates=9000), "allowed: up to 20000 runs"),
+        (DesignOrder("lhs", blocks=2), "--blocks: is not for lhs; allowed with: .*, or 2 replicates of any design"),
         (DesignOrder("box-behnken", blocks=2), "no number of blocks is orthogonal .*; or .* --replicates 2 --blocks 2"),
         (DesignOrder("factorial", nonregular=True), "--nonregular: is not for factorial"),
     ],
@@ -341,7 +341,7 @@ def test_a_finished_run_that_cannot_be_read_is_named_by_line_and_column(tmp_path
 def test_a_factor_called_block_is_refused_where_there_are_blocks(tmp_path):
     file = read_factors(factors_file(tmp_path, FACTORS.replace('"strength"', '"block"')))
     assert len(make_plan(DesignOrder("factorial"), file).block) == 0
-    with pytest.raises(CommandError, match="the sheet's column 'block' is a name of the factors file"):
+    with pytest.raises(CommandError, match="the sheet needs the column 'block', a name in the factors file"):
         make_plan(DesignOrder("factorial", blocks=2), file)
 
 

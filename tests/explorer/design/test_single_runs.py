@@ -150,7 +150,7 @@ def test_blocks_that_nobody_named_are_noticed(tmp_path):
 
 
 def test_a_block_that_is_none_is_refused_in_one_line(tmp_path):
-    with pytest.raises(CommandError, match=r"--block shift: no column of blocks; the other columns are batch$"):
+    with pytest.raises(CommandError, match=r"--block shift: no such column for blocks; the other columns are batch$"):
         analysed(tmp_path, BLOCKED, "", block="shift")
     with pytest.raises(CommandError, match="line 4, column batch: is empty"):
         analysed(tmp_path, BLOCKED.replace("b1,80,170", ",80,170"), "", block="batch")

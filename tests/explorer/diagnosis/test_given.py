@@ -58,7 +58,7 @@ def test_what_was_given_before_stays_as_it_was_calibrated(tmp_path):
 @pytest.mark.parametrize("case", ["nothing", "ambiguous"])
 def test_an_answer_without_a_probable_effect_gives_none(tmp_path, case):
     folder = written(tmp_path / "first", result_of_case(case))
-    with pytest.raises(CommandError, match=r"allowed: a diagnosis in which an effect has 90%"):
+    with pytest.raises(CommandError, match=r"allowed: a diagnosis in which one effect has a probability"):
         earlier_answer(folder, SOURCE)
     refused = explorer("diagnose", "trefoil_1", "--given", str(tmp_path), "--out", str(tmp_path / "out"))
     assert refused.exit_code == 2
@@ -131,15 +131,15 @@ def test_what_cannot_be_gone_on_from_is_refused(tmp_path):
         earlier_answer(written(tmp_path / "other", content), SOURCE)
     content = result_of_case("effect")
     content["order"]["given"] = str(tmp_path / "round")
-    with pytest.raises(CommandError, match="goes on from itself"):
+    with pytest.raises(CommandError, match="continues itself"):
         earlier_answer(written(tmp_path / "round", content), SOURCE)
     first = written(tmp_path / "first", result_of_case("effect"))
     refused = explorer("diagnose", "trefoil_1", "--given", str(first), "--out", str(first), "--resume")
-    assert (refused.exit_code, "is --out too" in refused.stderr) == (2, True)
+    assert (refused.exit_code, "is the same folder as --out" in refused.stderr) == (2, True)
     (name,) = typed(result_of_case("effect")).named
     out = tmp_path / "out"
     refused = explorer("diagnose", "trefoil_1", "--given", str(first), "--effects", name, "--out", str(out))
-    assert (refused.exit_code, "all of them are in the model" in refused.stderr) == (2, True)
+    assert (refused.exit_code, "all of them are already in the model" in refused.stderr) == (2, True)
     assert not out.exists()
 
 
@@ -265,7 +265,7 @@ def test_a_diagnosis_gone_on_with_leaves_a_follow_up_that_is_filled_in(tmp_path,
     measured = table.read_text()
     again = explorer(*words, "--resume")
     assert again.exit_code == 0, again.stderr
-    told = f"{out}/next: is there already and stays as it is, for somebody may have filled it in"
+    told = f"{out}/next: exists already and is not changed, as it may be filled in"
     assert told in again.stdout
     assert "not what this answer asks for" not in again.stdout
     assert table.read_text() == measured

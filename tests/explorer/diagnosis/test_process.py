@@ -92,13 +92,13 @@ def test_cancel_and_resume_also_from_a_later_page(tmp_path):
     assert process.status().state == "cancelled"
     assert process.finished() == ()
     later = diagnosis(tmp_path)
-    with pytest.raises(BackgroundError, match="no diagnosis of trefoil_2 has been stopped"):
+    with pytest.raises(BackgroundError, match="no diagnosis of trefoil_2 was stopped"):
         later.resume(Question("trefoil_2"))
     later.resume(Question("trefoil_1"))
     wait_for(lambda: later.status().state != "running")
     assert later.status().state == "finished"
     assert json.loads((only_folder(tmp_path) / "arguments.json").read_text())[-1] == "--resume"
-    with pytest.raises(BackgroundError, match="no diagnosis of trefoil_1 has been stopped"):
+    with pytest.raises(BackgroundError, match="no diagnosis of trefoil_1 was stopped"):
         later.resume(Question("trefoil_1"))
 
 

@@ -273,7 +273,7 @@ def test_a_program_of_a_plug_in_is_listed_and_written_for(tmp_path, monkeypatch)
     assert result.output == f"{tmp_path / 'new'}: every 0.5 s, seed 3\n"
     assert "seed" in (tmp_path / "new" / "names.txt").read_text().splitlines()
     line = refused(explorer("export", "seed_pour", tmp_path / "other", "--to", "edem", "--every", "0.5"))
-    assert line == "--every: belongs to --to paraview or tally, not to edem"
+    assert line == "--every: allowed only with --to paraview or tally, not with edem"
 
 
 def test_the_page_names_programs_of_plug_ins_without_loading_them(monkeypatch):

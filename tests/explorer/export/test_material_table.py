@@ -103,13 +103,13 @@ def test_the_command_writes_them_without_a_pour(tmp_path):
 
 def test_every_is_about_moments_only(tmp_path):
     line = refused(explorer("export", "funnel", tmp_path / "new", "--to", "edem", "--every", "0.1"))
-    assert line == "--every: belongs to --to paraview, not to edem"
+    assert line == "--every: allowed only with --to paraview, not with edem"
 
 
 @pytest.mark.parametrize("option", [("--time", 2), ("--seed", 1)])
 def test_what_belongs_to_a_pour_is_refused_where_the_material_alone_is_taken(option, tmp_path):
     line = refused(explorer("export", "funnel", tmp_path / "new", "--to", "edem", *option))
-    assert line == "--time, --seed: of a pour, and --to edem takes the material alone"
+    assert line == "--time, --seed: not allowed with --to edem, which exports only the material"
 
 
 @pytest.fixture(scope="module")

@@ -55,5 +55,5 @@ def test_a_body_is_turned_and_sized_as_on_the_screen():
 
 
 def test_nothing_to_export_is_told():
-    with pytest.raises(CommandError, match="no body is in the domain yet"):
+    with pytest.raises(CommandError, match="no body has entered yet"):
         bodies_stl(frame_of([], np.zeros((0, 3))), BEADS)

@@ -49,7 +49,7 @@ def test_the_points_of_an_outline_are_drawn_from_left_to_right():
         ("a.npz", npz(xyz=np.zeros((2, 3))), "xyz, radius"),
         ("a.npz", npz(xyz=np.zeros((2, 3)), radius=np.ones(3)), "shapes"),
         ("a.npz", npz(xyz=np.zeros((0, 3)), radius=np.ones(0)), "shapes"),
-        ("a.npz", npz(xyz=np.zeros((1, 3)), radius=np.zeros(1)), "not positive"),
+        ("a.npz", npz(xyz=np.zeros((1, 3)), radius=np.zeros(1)), "must be positive"),
         ("a.npz", npz(xyz=np.full((1, 3), 2 * FARTHEST), radius=np.ones(1)), "beyond 2 m"),
         ("a.npz", npz(xyz=np.full((1, 3), np.nan), radius=np.ones(1)), "not finite"),
         ("a.npz", npz(xyz=np.array([["a", "b", "c"]]), radius=np.ones(1)), "plain arrays"),

@@ -59,7 +59,7 @@ def test_a_bad_mesh_is_refused_in_one_line_and_leaves_nothing(name, content, uni
 
 
 def test_a_body_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(CommandError, match="none of that name"):
+    with pytest.raises(CommandError, match="no such body"):
         shaped_source(SCENE, "pebble", "box.stl", stl(), None, tmp_path)
 
 

@@ -243,10 +243,10 @@ def test_tables_for_edem_come_back(declared, tmp_path):
     ("program", "text", "words"),
     [
         ("liggghts", "units micro\n", "units micro; allowed: si"),
-        ("liggghts", "run 10\n", "says no material"),
+        ("liggghts", "run 10\n", "no material found"),
         ("liggghts", "fix a all property/global youngsModulus peratomtype v_E\n", "'v_E' is not a number"),
         ("liggghts", "fix a all property/global coefficientFriction peratomtypepair 2 1 2 3\n", "allowed: 4"),
-        ("yade", "FrictMat(young=open('x').read())\n", "line 1: FrictMat(young=open('x').read()): not known"),
+        ("yade", "FrictMat(young=open('x').read())\n", "line 1: FrictMat(young=open('x').read()): cannot be evaluated"),
         ("yade", "a = = 1\n", "line 1: is not Python"),
         ("yade", "FrictMat(young=1e7, poisson=0.9)\n", "poisson_ratio"),
         (
@@ -259,11 +259,11 @@ def test_tables_for_edem_come_back(declared, tmp_path):
             "fix p all particletemplate/multisphere 1 spheres file /etc/passwd mass 1 inertia_tensor 1 0 0 1 0 1\n",
             "spheres file /etc/passwd; allowed: a file beside the script",
         ),
-        ("edem", "maize, 1, 2\n", "says no material"),
+        ("edem", "maize, 1, 2\n", "no material found"),
         (
             "edem",
             "Material 1,Material 2,Coefficient of Rolling Friction\na,b,0.01\n",
-            "says no material in edem's words",
+            "no material found in edem's syntax",
         ),
         ("edem", "Material,Shear Modulus [Pa]\nmaize,stiff\n", "maize: shear_modulus: 'stiffPa'"),
         ("edem", "Material,Shear Modulus [psi]\nmaize,3\n", "psi"),

@@ -191,7 +191,7 @@ def test_a_pour_gets_what_was_measured_in_a_file_that_says_where_it_is_from(tmp_
 
 def test_readings_without_a_parameter_or_of_another_material_pour_nothing(tmp_path):
     present = load_material("sunflower_extract")
-    with pytest.raises(CommandError, match="moisture: gives no parameter"):
+    with pytest.raises(CommandError, match="moisture: the test gives no material parameter"):
         measured_source(present, analysed(LabOrder("moisture", "moisture")), tmp_path)
     path = tmp_path / "other.csv"
     path.write_text("a,b,replicate,angle_deg\n" + "".join(f"maize,steel,r{k},{20 + k / 10}\n" for k in range(5)))

@@ -38,8 +38,8 @@ def test_what_a_command_prints_is_told():
 
 def test_a_command_without_good_news_has_an_answer_if_it_says_anything():
     assert python("print('does not close'); raise SystemExit(1)") == "does not close"
-    with pytest.raises(CommandError, match="no body of that name"):
-        python("import sys; print('error: no body of that name', file=sys.stderr); raise SystemExit(1)")
+    with pytest.raises(CommandError, match="no such body"):
+        python("import sys; print('error: no such body', file=sys.stderr); raise SystemExit(1)")
 
 
 def test_a_refusal_is_its_last_line():

@@ -86,9 +86,9 @@ TIME = np.arange(0.0, 8.0, 0.05)
     [
         (TIME[:5], TIME[:5], "time_s,mass_g", "5 readings; allowed: 10 or more"),
         (TIME, steady(TIME), "t,m", "columns t,m; allowed: one of time_s, time_ms, time_min"),
-        (TIME[::-1], steady(TIME), "time_s,mass_g", r"b.csv:3: time: does not grow"),
-        (TIME[:60], steady(TIME)[:60], "time_s,mass_g", "no level end"),
-        (TIME, 0.0 * TIME, "time_s,mass_g", "no level end"),
+        (TIME[::-1], steady(TIME), "time_s,mass_g", r"b.csv:3: time: does not increase"),
+        (TIME[:60], steady(TIME)[:60], "time_s,mass_g", "not constant at the end"),
+        (TIME, 0.0 * TIME, "time_s,mass_g", "not constant at the end"),
         (TIME, np.where(TIME < 3.0, 0.0, 0.03), "time_s,mass_g", "1 readings between 20% and 80%"),
         (TIME, np.where(TIME[7] == TIME, np.nan, steady(TIME)), "time_s,mass_g", "b.csv:9: mass_g: 'nan'"),
     ],

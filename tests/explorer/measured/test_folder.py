@@ -233,7 +233,7 @@ def test_a_drum_s_sheet_is_read_as_the_laboratory_does(tmp_path):
     (angle,) = (one for one in analyse("drum", asset_path("laboratory", "drum")).derived if one.name == "dynamic_angle")
     assert values(folder, "A", "dynamic_angle_deg") == pytest.approx(np.degrees(angle.values), rel=1e-12)
     drum[-3] = "rig.speed_rpm=20"
-    assert "a Froude number of" in refused(explorer("new", "measurement", tmp_path / "b", *drum))
+    assert "its Froude number is" in refused(explorer("new", "measurement", tmp_path / "b", *drum))
 
 
 def test_pictures_of_a_drum_s_face_give_its_angle_and_surface(tmp_path):
@@ -258,7 +258,7 @@ def test_pictures_of_a_drum_s_face_give_its_angle_and_surface(tmp_path):
     assert "--photo, --angles, --drum: each gives dynamic_angle_deg" in refused(
         explorer("new", "measurement", tmp_path / "b", *drum, "--photo", photos[0], "--angles", "28,29")
     )
-    assert "--scale: of pictures of a drum" in refused(
+    assert "--scale: not allowed for pictures of a drum" in refused(
         explorer("new", "measurement", tmp_path / "b", *drum, "--photo", photos[0], "--scale", "0.2")
     )
 
@@ -295,19 +295,19 @@ def test_a_diagnosis_plans_its_pours_from_the_folder(material, tmp_path):
         (["--angles", "24"], "(--uncertainty NAME=VALUE)"),
         (["--angles", "24,x"], "--angles 24,x: allowed: angles in degrees"),
         (["--angles", "24,95"], "above 0 and below 90"),
-        (["--angles", "24,25", "--lag", "1"], "--starts, --lag: belong to --balance"),
-        (["--angles", "24,25", "--set", "pair.glass.glass.static_friction=0.4"], "no condition states it"),
+        (["--angles", "24,25", "--lag", "1"], "--starts, --lag: allowed only with --balance"),
+        (["--angles", "24,25", "--set", "pair.glass.glass.static_friction=0.4"], "a condition cannot state it"),
         (["--angles", "24,25", "--set", "rig.name=inclined_plane"], "inclined_plane"),
         (["--angles", "24,25", "--condition", "a/b"], "letters, digits"),
         (["--angles", "24,25", "--uncertainty", "colour=1"], "uncertainty.colour: no such observable"),
-        (["--angles", "24,25", "--role", "holdout"], "none of 1 conditions is fit"),
+        (["--angles", "24,25", "--role", "holdout"], "none of 1 conditions has the role fit"),
         (["--angles", "24,25", "--study", "sunflower_extract"], "needs --study or --material"),
         (["--photo", "missing.jpg"], "missing.jpg"),
         (["--photo", "BLANK"], "blank.png: no angle: blank"),
         (["--photo", "PILE", "--photo", "PILE"], "is the same picture as"),
-        (["--photo", "PILE"], "condition 'A' tells nothing"),
-        (["--scan", "BLANK"], "allowed: a file that is there and ends in .ply"),
-        (["--drum", "drum"], "--drum: funnel gives angle_of_repose_deg"),
+        (["--photo", "PILE"], "condition 'A' has no usable value"),
+        (["--scan", "BLANK"], "allowed: an existing file ending in .ply"),
+        (["--drum", "drum"], "--drum: the rig funnel does not give this"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else None,
 )
@@ -327,7 +327,7 @@ def test_a_folder_with_data_changes_as_a_whole_or_not_at_all(material, tmp_path)
     new(folder, "--material", material, "--angles", "24,25")
     before = files(tmp_path)
     for arguments, words in (
-        (["--angles", "24,25"], "--condition A: is there already"),
+        (["--angles", "24,25"], "--condition A: exists already"),
         (["--condition", "B", "--angles", "24"], "B.csv: angle_of_repose_deg: one replicate has no scatter"),
         (["--condition", "B", "--angles", "24,25", "--material", material], "--material: "),
         (["--condition", "B", "--angles", "24,25", "--set", "rig.outlet_height=9m"], "rig.outlet_height"),
@@ -353,7 +353,9 @@ def test_a_file_that_bears_the_name_of_a_new_one_is_not_overwritten(material, pi
     before = files(tmp_path)
     photos = [word for one in pictures for word in ("--photo", one)]
     line = refused(explorer("new", "measurement", folder, "--condition", "B", *photos))
-    assert line == f"--condition B: {folder / 'images/B_1.png'} is there already; allowed: a name whose files are not"
+    assert (
+        line == f"--condition B: {folder / 'images/B_1.png'} exists already; allowed: a name whose files do not exist"
+    )
     assert files(tmp_path) == before
 
 

@@ -103,7 +103,7 @@ def test_one_photograph_says_that_it_knows_no_spread_between_piles(piles, tmp_pa
 def test_a_study_of_another_observable_takes_no_photograph(piles, tmp_path):
     target = keep(tmp_path / "target", piles[0])
     other = [replace(one, observable="bulk_density_kg_m3") for one in load_study("sunflower_extract").targets]
-    with pytest.raises(CommandError, match=f"a photograph gives {OBSERVABLE}, and the study's target is bulk_density"):
+    with pytest.raises(CommandError, match=f"a photograph gives {OBSERVABLE}, but the study's target is bulk_density"):
         target.of_study(other)
 
 
@@ -305,5 +305,5 @@ def test_a_study_that_does_not_fit_stays_as_it_was(piles, blank, tmp_path):
     assert "is a material, not a study" in refused(explorer("measure", piles[0], "--target", tmp_path / "lentil.toml"))
     file.write_text(before.replace('"angle_of_repose_deg"', '"apex_height_m"'), encoding="utf-8")
     line = refused(explorer("measure", piles[0], "--target", file))
-    assert line == "a photograph gives angle_of_repose_deg, and the study's target is apex_height_m"
+    assert line == "a photograph gives angle_of_repose_deg, but the study's target is apex_height_m"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["lentil.toml", "lentil_study.toml"]

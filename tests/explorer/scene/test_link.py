@@ -39,9 +39,9 @@ def test_a_project_s_own_scene_is_told_by_its_checksum_and_known_again_only_ther
     text = pour_text(own, own.scene, 1, own)
     assert "lentil" not in text
     assert read_pour(text, own).scene == own.scene
-    with pytest.raises(CommandError, match="neither a shipped scene nor the one that this page began with"):
+    with pytest.raises(CommandError, match="neither a shipped scene nor the one that this page started with"):
         read_pour(text, BEGUN)
-    with pytest.raises(CommandError, match="a file of this machine"):
+    with pytest.raises(CommandError, match="a file on this machine"):
         pour_text(own, own.scene, 1, BEGUN)
 
 
@@ -66,7 +66,7 @@ def test_a_scene_of_no_file_is_refused_in_writing():
         ("pour=sunflower_extract&set=rig.mass%3Dnan", "rig.mass"),
         ("pour=sunflower_extract&seed=x", "link, seed: 'x' is not a finite number"),
         ("pour=sunflower_extract&time=inf", "link, time: 'inf' is not a finite number"),
-        ("pour=" + "x" * LONGEST, "allowed are 2000"),
+        ("pour=" + "x" * LONGEST, "allowed: up to 2000"),
     ],
 )
 def test_what_a_link_must_not_hold_is_refused_in_one_line(text, line):

@@ -68,7 +68,7 @@ def test_nothing_changed_is_nothing_to_save(tmp_path):
 
 @pytest.mark.parametrize("name", ["../../etc/passwd", f"../x{OWN_MARK}", "none of these"])
 def test_only_listed_presets_are_read(name, tmp_path):
-    with pytest.raises(CommandError, match="there is none of that name"):
+    with pytest.raises(CommandError, match="no such preset"):
         preset_path(name, tmp_path)
 
 

@@ -119,7 +119,7 @@ def test_what_no_setting_can_reach_is_refused_in_one_line():
     other = replace(SUNFLOWER.scene, title="another")
     with pytest.raises(CommandError, match="save the scene file instead"):
         command_line(SUNFLOWER, other, 1)
-    with pytest.raises(CommandError, match="came from no file"):
+    with pytest.raises(CommandError, match="does not come from a file"):
         command_line(SceneSource((), SUNFLOWER.scene), SUNFLOWER.scene, 1)
 
 
@@ -148,6 +148,6 @@ def test_a_folder_of_no_finished_calibration_is_told_so_and_hides_no_shipped_nam
     monkeypatch.chdir(tmp_path)
     (tmp_path / "results").mkdir()
     (tmp_path / "soybean").mkdir()
-    with pytest.raises(ParameterError, match=r"^results: a folder without the result\.json of a finished calibration$"):
+    with pytest.raises(ParameterError, match=r"^results: the folder holds no result\.json of a finished calibration$"):
         load_scene("results")
     assert load_scene("soybean").bodies

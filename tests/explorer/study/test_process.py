@@ -186,7 +186,7 @@ def test_a_study_that_another_page_runs_is_not_resumed(tmp_path):
     first, second = study(tmp_path, "time.sleep(60)"), study(tmp_path, "time.sleep(60)")
     first.start("quick")
     wait_for(lambda: first.status().done == 3)
-    with pytest.raises(BackgroundError, match="started from another page"):
+    with pytest.raises(BackgroundError, match="another page's command is running"):
         second.resume()
     first.close()
 
@@ -292,7 +292,7 @@ def test_a_line_that_is_full_takes_no_more(tmp_path):
     process.start("quick")
     for _ in range(MOST_WAITING):
         process.queue("standard")
-    with pytest.raises(BackgroundError, match="wait already"):
+    with pytest.raises(BackgroundError, match="already waiting"):
         process.queue("full")
     assert process.waiting() == ("standard",) * MOST_WAITING
     process.close()

@@ -67,7 +67,7 @@ def test_two_studies_in_one_folder_are_refused_and_the_first_is_left_alone(tmp_p
         refused = calibrate(tmp_path, "--resume")
     assert refused.exit_code == 2
     assert refused.output.count("\n") == 1
-    assert "out: another command is at work there" in refused.output
+    assert "out: another command is writing there" in refused.output
     assert not list((tmp_path / "out").iterdir())
 
 
@@ -186,7 +186,10 @@ def test_a_target_out_of_reach_stops_a_study_unless_it_is_told_to_go_on(tmp_path
         (("--profile", "huge"), "sunflower_extract.toml: profile: 'huge' is not one of quick, standard, full\n"),
         (("--study", "nowhere.toml"), "sunflower_extract"),
         (("--fail-above", "-1"), "fail-above"),
-        (("--scheduler", "tcp://127.0.0.1:9", "--record", "pours"), "--record pours: a folder takes pours of this"),
+        (
+            ("--scheduler", "tcp://127.0.0.1:9", "--record", "pours"),
+            "--record pours: a folder records only pours on this",
+        ),
         (("--summary", "no/such/summary.md"), "--summary no/such/summary.md: there is no folder "),
         (("--junit", "/"), "--junit /: is a folder; name a file"),
     ],

@@ -70,12 +70,12 @@ def test_a_study_file_that_is_gone_or_a_label_that_nobody_gave_is_one_line(keyed
         scene_of(lost, "surface", run)
     for stage, label in (("surface", "point 99"), ("surface", "row 1"), ("scan", "x = 1"), ("verification", "best"),
                          ("screening", "row 0"), ("ascent", "step"), ("pilot", "<b>")):  # fmt: skip
-        with pytest.raises(ValueError, match="is no setting of the stage"):
+        with pytest.raises(ValueError, match="is not a setting of the stage"):
             settings_of(result, stage, label)
     with pytest.raises(ValueError, match="no such stage"):
         settings_of(result, "optimum", "optimum")
     begun = PartialStudy(study=result.study, pilot=result.pilot)
-    with pytest.raises(ValueError, match="there are pilot"):
+    with pytest.raises(ValueError, match="allowed: pilot"):
         settings_of(begun, "surface", "point 1")
 
 
@@ -83,7 +83,7 @@ def test_a_result_of_before_settings_were_kept_says_so(keyed):
     result, _ = keyed
     content = result.to_dict()
     del content["ascent"]["settings"]
-    with pytest.raises(ValueError, match=r"^ascent: .* an older version made it$"):
+    with pytest.raises(ValueError, match=r"^ascent: .* an older version of the program made it$"):
         settings_of(StudyResult.from_dict(content), "ascent", "step 1")
 
 

@@ -368,7 +368,7 @@ def get(server, path, **headers):
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "", "192.168.1.5", "my-machine"])
 def test_a_page_for_others_does_not_start_without_a_token(host):
-    with pytest.raises(PortError, match=r"anybody in the network.*EXPLORER_TOKEN"):
+    with pytest.raises(PortError, match=r"anybody on the network.*EXPLORER_TOKEN"):
         guarded_server(host, 0, "test")
     with pytest.raises(PortError, match=r"--token: 5 characters; allowed: .* at least 16"):
         guarded_server(host, 0, "test", token="short")
@@ -477,7 +477,7 @@ def test_files_do_not_pile_up_for_a_browser_that_takes_none(attacked):
     # On a busy machine viser takes the whole first file out of its queue at once; then a second one waits behind it.
     refused = [not sendable(client) for _ in range(2)]
     assert refused[-1]
-    with pytest.raises(CommandError, match=r"^another.bin: this browser has not received the file before it yet"):
+    with pytest.raises(CommandError, match=r"^another.bin: this browser has not yet received the previous file"):
         send_file(client, "another.bin", b"x")
     deaf.controls()
     wait_for(lambda: sendable(client), 60.0)

@@ -83,7 +83,7 @@ def test_the_body_on_top_is_pulled_unless_another_one_is_named(bench):
 
 
 def test_nobody_to_pull_and_a_number_out_of_range_are_refused(bench):
-    assert bench.person.press("Pull") == "pull: no body is there yet"
+    assert bench.person.press("Pull") == "pull: no body has entered yet"
     bench.person.send("Tap: up [mm]", math.nan)
     assert "finite" in bench.person.press("Tap")
     assert "finite" in bench.told()

@@ -86,7 +86,7 @@ def test_it_is_kept_in_the_project_or_with_the_users_data(server, tmp_path, proj
     [
         (NAME, "../../etc/passwd", "letters, digits"),
         (NAME, "<b>", "letters, digits"),
-        ("Shape", "dodecahedron", "allowed are seed"),
+        ("Shape", "dodecahedron", "allowed: seed"),
         ("Length [mm]", float("inf"), "not a finite number"),
         (DENSITY, float("nan"), "not a finite number"),
     ],

@@ -86,7 +86,7 @@ def test_a_folder_of_our_export_comes_as_an_archive(form, tmp_path):
 @pytest.mark.parametrize(
     ("program", "name", "content", "words"),
     [
-        ("liggghts", "in.nothing", b"units si\n", "in.nothing: says no material in liggghts's words"),
+        ("liggghts", "in.nothing", b"units si\n", "in.nothing: no material found in liggghts's syntax"),
         ("yade", "a.py", b"x = (", "a.py: "),
         ("edem", "a.csv", b"", "0 bytes; allowed"),
         ("edem", "a.zip", b"no archive", "cannot be unpacked"),
@@ -109,4 +109,4 @@ def test_a_file_is_not_overwritten_and_a_name_is_one(form):
     form.person.enter(NAME, "../maize")
     assert "letters, digits" in form.send("edem", "maize.csv", EDEM.encode())
     form.person.send("File of", "Excel")
-    assert "allowed are LIGGGHTS" in form.person.upload(UPLOAD, "a.xls", b"x")
+    assert "allowed: LIGGGHTS" in form.person.upload(UPLOAD, "a.xls", b"x")

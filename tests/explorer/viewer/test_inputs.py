@@ -27,6 +27,8 @@ def test_a_refusal_names_what_stands_on_the_page_and_leaves_other_options_alone(
 
 
 def test_a_decimal_comma_is_refused_with_the_way_to_write_it():
-    with pytest.raises(CommandError, match=r"^target '25,5': allowed is a number with a decimal point, or nothing$"):
+    with pytest.raises(
+        CommandError, match=r"^target '25,5'; allowed: a number with a decimal point, or an empty field$"
+    ):
         number_or_none("25,5", "target")
     assert number_or_none(" 25.5 ", "target") == 25.5

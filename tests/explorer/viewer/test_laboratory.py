@@ -204,8 +204,8 @@ def test_a_form_left_as_it_is_asks_for_what_the_command_does(design):
 @pytest.mark.parametrize(
     ("label", "entered", "words"),
     [
-        ("Centre runs", "-1", "Centre runs '-1': allowed is a whole number, 0 … 1000, or nothing"),
-        ("Seed", "1.5", "Seed '1.5': allowed is a whole number, 0 and more"),
+        ("Centre runs", "-1", "Centre runs '-1'; allowed: a whole number, 0 … 1000, or an empty field"),
+        ("Seed", "1.5", "Seed '1.5'; allowed: a whole number, 0 and more"),
         ("Runs of each row", "many", "Runs of each row 'many'"),
         ("Blocks", "1", "2 … 512"),
     ],
@@ -267,7 +267,7 @@ def test_the_factors_file_to_edit_is_the_chosen_one(design):
 def test_a_mixture_is_asked_for_its_lattice(design):
     part = '[[factor]]\nname = "%s"\nlow = 0\nhigh = 100\nunit = "%%"\n'
     design.enter("Design", "mixture")
-    assert "high less low is not the same" in design.press("Make the sheet")  # the shipped factors are no parts
+    assert "high minus low differs" in design.press("Make the sheet")  # the shipped factors are no parts
     blend = "".join(part % one for one in ("sand", "clay", "silt"))
     assert design.upload("Upload: factors", "soil.toml", blend.encode()) == ""
     design.enter("Degree of the lattice", "2")
@@ -449,10 +449,10 @@ def test_a_sheet_is_made_and_a_filled_one_analysed(design, analysis):
     assert "Contours" in analysis.options("Chart of it")
     assert analysed(Drop_terms="by AICc", Model="quadratic") == ""
     assert "--model quadratic --reduce aicc" in analysis.text
-    assert analysed(Terms="A, B") == "Terms: stands instead of Model; allowed: one of them"
+    assert analysed(Terms="A, B") == "Terms: given together with Model; allowed: one of the two"
     assert "target 'steep'" in analysed(Terms="", Target="steep")
-    assert "allowed: 0 and more" in analysed(Target="24.68", **{error: "-1"})
-    assert "Block shift: no column of blocks" in analysed(Target="", Block="shift", **{error: ""})
+    assert "allowed: 0 or more" in analysed(Target="24.68", **{error: "-1"})
+    assert "Block shift: no such column for blocks" in analysed(Target="", Block="shift", **{error: ""})
 
 
 def test_an_audit_of_the_shipped_article_and_of_an_archive(room):
@@ -584,9 +584,9 @@ def test_measured_data_that_do_not_fit_are_refused_in_one_line(room):
         return data.press("Save the data")
 
     assert "nothing was measured: give Angles, or Add a photograph, " in refused()
-    assert "a file of them goes by the command line" in refused(angles="angles.csv")
+    assert "use the command line for a file" in refused(angles="angles.csv")
     assert "letters, digits" in refused(angles="24,25", name="../lot")
-    assert "rig.mesh: allowed: the study's own" in refused(name="lot", set_up="rig.mass=12g rig.mesh=/etc/passwd")
+    assert "rig.mesh: allowed here: the study's own" in refused(name="lot", set_up="rig.mass=12g rig.mesh=/etc/passwd")
     assert "Lag of the balance 'long'" in refused(set_up="", lag="long")
     data.upload(PHOTOGRAPHS.label, "a.jpg", b"no picture")
     assert "a-" in refused(lag="")

@@ -33,7 +33,7 @@ def desk(server, tmp_path):
 def test_the_name_of_a_shipped_data_set_is_refused(desk):
     desk.patient.enter("Data set", "trefoil_2")
     desk.patient.enter("Angles [°]", "24, 25")
-    assert desk.patient.press("Save the data") == "Data set: trefoil_2 comes with the program; choose another name"
+    assert desk.patient.press("Save the data") == "Data set: trefoil_2 is shipped with the program; choose another name"
     assert kept_measurements(desk.uploads) == {}
 
 

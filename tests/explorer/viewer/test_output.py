@@ -448,5 +448,5 @@ def test_all_files_of_an_answer_are_sent_together():
     browser.send_file_download = sent
     send_files(browser, {"part.toml": b"a", "report.html": b"b"})
     assert browser.sent == {"part.toml": b"a", "report.html": b"b"}
-    with pytest.raises(CommandError, match=r"^later\.csv: this browser has not received"):
+    with pytest.raises(CommandError, match=r"^later\.csv: this browser has not yet received"):
         send_file(browser, "later.csv", b"c")

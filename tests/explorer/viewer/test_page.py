@@ -269,7 +269,7 @@ def test_a_panel_of_a_plug_in_stands_in_its_tab_and_follows_the_page(plugged_in,
     assert study == ["Pour", "Calibrate", "Diagnose", "Laboratory", "Reports", "Magnets"]
     assert "absent" not in page.panels
     running.ask(do="pour_link", text="pour=strong")
-    told = "funnel: link: 'strong' is neither a shipped scene nor the one that this page began with"
+    told = "funnel: link: 'strong' is neither a shipped scene nor the one that this page started with"
     wait_for(lambda: person.within("Magnets").within("Pull").text == told)
     wait_for(lambda: person.within("Look").text.endswith(told))
     with pytest.raises(AssertionError, match="nothing is called ''"):

@@ -77,7 +77,7 @@ def test_a_prepared_scene_is_poured_and_has_a_command_line(bench, name):
 
 
 def test_only_listed_scenes_are_poured(bench):
-    assert "there is none of that name" in bench.person.send("Prepared scene", "../materials/nine_sphere_seed")
+    assert "no such scene" in bench.person.send("Prepared scene", "../materials/nine_sphere_seed")
     assert bench.session.asked == []
 
 
@@ -111,8 +111,8 @@ def test_a_bad_material_from_the_browser_changes_nothing(bench):
     [
         ("funnel", "", "name a file"),
         ("funnel", "/nowhere/own.toml", "neither a file"),
-        ("<script>", "x", "allowed are funnel"),
-        ("inclined_plane", "x", "allowed are funnel"),
+        ("<script>", "x", "allowed: funnel"),
+        ("inclined_plane", "x", "allowed: funnel"),
     ],
 )
 def test_what_cannot_be_poured_is_one_line_and_changes_nothing(bench, rig, file, words):
@@ -151,7 +151,7 @@ def test_a_bad_mesh_changes_nothing(bench):
     before = (list(bench.session.asked), bench.session.now)
     assert "not watertight" in bench.person.upload(SHAPE, "open.stl", stl(holes=2))
     bench.person.send("Unit", "league")
-    assert "allowed are" in bench.person.upload(SHAPE, "box.stl", stl())
+    assert "allowed: files" in bench.person.upload(SHAPE, "box.stl", stl())
     assert (bench.session.asked, bench.session.now) == before
 
 

@@ -212,7 +212,7 @@ def test_a_row_of_the_board_pours_that_run_in_the_scene(table, result, tmp_path)
     asked = next(one for one in runs["opens"] if one["stage"] == "surface" and one["label"].startswith("point 4"))
     # The formula gives other keys than a pour would, and the page says so.
     table.page.channel.take(json.dumps(asked))
-    assert "have changed since that run" in table.actions.carry_out()
+    assert "has changed since that run" in table.actions.carry_out()
     (poured,) = table.session.asked
     assert (poured[0], poured[2]) == ("restart", asked["seed"])
     for factor, natural in zip(result["surface"]["factors"], result["surface"]["natural"][3], strict=True):
@@ -303,7 +303,7 @@ def test_runs_are_left_out_of_the_study_that_is_shown(table, result, tmp_path):
     assert load_excluded(folder) == tuple(excluded)
     told = {one["title"]: one["rows"] for one in table.board()["tables"]}
     assert told["Runs left out"] == [[run.label, str(run.seed), "wedged"]]
-    with pytest.raises(CommandError, match="another study is shown by now"):
+    with pytest.raises(CommandError, match="another study is now shown"):
         in_hand.take(replace(shown), excluded)
     assert in_hand.excluded() == tuple(excluded)
 

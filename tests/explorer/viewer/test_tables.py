@@ -117,7 +117,7 @@ def test_ranges_are_read_with_a_comma_or_a_point_in_any_order():
         ([{"name": "X4", "low": "soft", "high": "1", "measured": "1"}], "X4, low: 'soft' is not a number"),
         ([{"name": "X4", "low": None, "high": "1", "measured": "1"}], "X4, low: 'None' is not a number"),
         ([{"name": "X4", "low": "nan", "high": "1", "measured": "1"}], "X4, low: 'nan' is not a number"),
-        ([{"name": "X7"}, "X4"], "X4: is not in the table any more"),
+        ([{"name": "X7"}, "X4"], "X4: is no longer in the table"),
     ],
 )
 def test_ranges_that_are_no_numbers_are_refused(sent, words):
@@ -232,7 +232,7 @@ def test_words_are_entered_in_a_column_of_words_and_what_nobody_changed_stays(tm
 def test_a_flag_is_no_reason(tmp_path, flag):
     path = tmp_path / "runs.csv"
     path.write_text(f"# factor | a | 0 | 1 | m\na [m],angle_deg,excluded\n0,20,{flag}\n1,21,\n", encoding="utf-8")
-    with pytest.raises(CommandError, match=f"line 3, column excluded: '{flag}' is no reason"):
+    with pytest.raises(CommandError, match=f"line 3, column excluded: '{flag}' is not a reason"):
         run_analyse(AnalyseOrder(sheet=str(path)))
 
 
