@@ -106,22 +106,16 @@ def test_the_density_is_a_gaussian_integrated_over_the_covariance():
 def test_what_predictions_vary_by_is_what_the_noise_of_each_pour_does_to_them():
     """The mean is linear in z: a unit of noise in one feature of one pour moves two predictions by d and e, sum d e."""
     rng = np.random.default_rng(5)
-    rows = np.column_stack([np.ones(9), rng.standard_normal((9, 2)), np.repeat([0.0, 1.0, 2.0], 3)])
-    z, slopes, variances, scales = (
-        rng.standard_normal((9, SIZE)),
-        np.full(1, 0.5),
-        np.linspace(0.1, 9.0, SIZE),
-        np.ones(1),
-    )
-    table = np.column_stack([rows[:, :2], rows[:, 3], rows[:, 3] ** 2 - rows[:, 3], rows[:, 1] ** 2 - 1.0])
-    mean, covariance = regression(table, z, slopes, variances, scales)
+    theta, a = rng.standard_normal(9), np.repeat([0.0, 1.0, 2.0], 3)
+    table = np.column_stack([np.ones(9), theta, a, a**2 - a, theta**2 - 1.0])
+    z, prior = rng.standard_normal((9, SIZE)), (np.full(1, 0.5), np.linspace(0.1, 9.0, SIZE), np.ones(1))
+    mean, covariance = regression(table, z, *prior)
     found = replace(emulator({"push": np.zeros(SIZE)}), mean=mean, covariance=covariance, information=table.T @ table)
     asked = np.array([[1.0, 0.5, 1.5, 0.75, -0.75], [1.0, -1.0, 0.0, 0.0, 0.0]])
     expected = np.zeros((2, 2))
     for pour in range(9):
-        noisy = z.copy()
-        noisy[pour] += 1.0
-        moved = asked @ (regression(table, noisy, slopes, variances, scales)[0] - mean).T
+        noisy = z + np.eye(9)[pour][:, None]
+        moved = asked @ (regression(table, noisy, *prior)[0] - mean).T
         expected += moved @ moved.T
     assert found.scatter(asked) == pytest.approx(expected)
     assert found.placed(asked[:1] * [1, 0, 1, 1, 0], np.array([[0.5]])) == pytest.approx(asked[:1])
