@@ -54,4 +54,4 @@ def test_a_refusal_names_the_fields_of_the_page(desk):
     person = desk.patient
     person.enter("Angles [°]", "24, 25")
     person.enter("Lag of the balance [s]", "0.1")
-    assert person.press("Save the data") == "Flow began at, Lag of the balance: belong to Add a balance's curve"
+    assert person.press("Save the data") == "Flow began at, Lag of the balance: allowed only with Add a balance's curve"

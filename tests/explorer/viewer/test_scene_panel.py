@@ -151,7 +151,7 @@ def test_a_bad_mesh_changes_nothing(bench):
     before = (list(bench.session.asked), bench.session.now)
     assert "not watertight" in bench.person.upload(SHAPE, "open.stl", stl(holes=2))
     bench.person.send("Unit", "league")
-    assert "allowed: files" in bench.person.upload(SHAPE, "box.stl", stl())
+    assert "allowed: m, cm, mm" in bench.person.upload(SHAPE, "box.stl", stl())
     assert (bench.session.asked, bench.session.now) == before
 
 
