@@ -110,7 +110,7 @@ def test_strong_correlations_stay_where_there_are_many_rows():
 
 def test_too_few_pours_are_refused():
     sample = sample_of(np.random.default_rng(0), {"push": unit(0)}, pours=5)
-    with pytest.raises(StatisticsError, match="push: 5 pours"):
+    with pytest.raises(StatisticsError, match="push: 5 valid pours"):
         fold_shifts(sample, "push")
 
 
