@@ -192,7 +192,7 @@ def test_what_the_runs_cannot_tell_is_refused_by_name():
         fit_named(points, np.arange(9.0)[:, None], region("AB"), (NAMES[:3], NAMES[:3]), "linear")
     with pytest.raises(StatisticsError, match="leave no error for 4 columns"):
         fit_named(codes(4)[:, None], np.arange(4.0)[:, None], region("A"), (NAMES,))
-    with pytest.raises(StatisticsError, match="B is a factor of names, which has no square"):
+    with pytest.raises(StatisticsError, match="B has named levels and therefore no square"):
         columns_of((0, 3), ("A", "B", "B^2"))
 
 

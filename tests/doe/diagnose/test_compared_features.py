@@ -51,7 +51,7 @@ def test_a_replicate_with_a_gap_and_a_pour_with_a_gap_are_left_out():
 
 def test_data_without_a_number_that_can_be_compared_are_refused():
     rng = np.random.default_rng(0)
-    with pytest.raises(StatisticsError, match="low: no number of the data"):
+    with pytest.raises(StatisticsError, match="low: no measured number varies"):
         weighed(lessons(rng), WAYS, [data(np.full((6, D), np.nan))])
 
 

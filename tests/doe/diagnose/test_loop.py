@@ -419,7 +419,7 @@ def test_an_effect_whose_pours_mostly_break_off_is_weighed_by_the_others(measure
 def test_a_budget_keeps_its_shares_and_its_least(measurement):
     planned = scaled_budget(400, measurement, NAMES)
     assert planned.planned(12, len(measurement.fit)) <= 400
-    with pytest.raises(StatisticsError, match="take at least"):
+    with pytest.raises(StatisticsError, match="allowed: at least"):
         scaled_budget(5, measurement, NAMES)
     least = scaled_budget(LEAST.planned(12, len(measurement.fit)), measurement, NAMES)
     assert (least.base, least.screening) == (LEAST.base, LEAST.screening)

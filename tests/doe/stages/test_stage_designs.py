@@ -111,7 +111,7 @@ def test_the_result_says_which_designs_were_run():
     ("tables", "message"),
     [
         ({"screening": {"design": "taguchi"}}, r"screening\.design: 'taguchi' is not one of plackett-burman, def"),
-        ({"screening": {"runs": 24}}, r"24 in the plackett-burman design of \[screening\]: runs 24: has 23 columns"),
+        ({"screening": {"runs": 24}}, r"24 in the plackett-burman design of \[screening\]: runs = 24: has 23 columns"),
         ({"screening": {"runs": "28"}}, r"screening\.runs: '28' is not a whole number"),
         ({"screening": {"fold": 1}}, r"screening\.fold: 1; allowed: true or false"),
         ({"screening": {"design": "lhs", "fold": True}}, r"screening\.fold: unknown key; allowed: design, runs, seed"),

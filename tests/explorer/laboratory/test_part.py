@@ -149,7 +149,7 @@ def test_a_measured_spread_of_sizes_comes_with_a_distribution_and_no_shape(scene
         ({"body": [{"name": "seed", "mass_fraction": 1.0}]}, "seed, plate, petiole"),
         ({"body": [{"name": n, "mass_fraction": 0.5} for n in ("seed", "plate", "petiole")]}, "add up to 1.5"),
         ({"body": [{"name": "seed", "mass_fraction": "much"}]}, "mass_fraction"),
-        ({"body": [{"name": "seed"}]}, "a mass_fraction, or size_distribution and size_spread"),
+        ({"body": [{"name": "seed"}]}, "a mass_fraction, or with size_distribution and size_spread"),
         ({"body": [{"name": "seed", "size_distribution": "log_normal", "size_spread": 0.7}]}, "size_spread"),
         ({"body": [{"name": "stone", "size_spread": 0.1}]}, "body.stone"),
     ],

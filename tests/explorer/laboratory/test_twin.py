@@ -140,7 +140,7 @@ def test_specimens_of_pairs_and_of_one_component(scene):
     assert (body.name, wall) == ("petiole", "rigid_sieve_plate")
     body, wall = specimen(scene, ("plate", "seed"))
     assert (body.name, wall) == ("plate", "seed")
-    with pytest.raises(CommandError, match="stone: no body"):
+    with pytest.raises(CommandError, match="stone: no such body"):
         specimen(scene, ("stone",))
 
 

@@ -81,7 +81,7 @@ def test_a_broken_run_keeps_its_name():
 
 
 def test_a_drum_runs_for_its_own_time():
-    with pytest.raises(ParameterError, match=r"numerics\.duration: 2 s in a rotating_drum"):
+    with pytest.raises(ParameterError, match=r"numerics\.duration: 2 s; allowed in the rig rotating_drum"):
         with_settings(BEADS, {"rig.name": "rotating_drum", "numerics.duration": 2.0})
 
 
