@@ -33,6 +33,7 @@ Closed forms by integration of H (1 - r/R) over the disc r < R; no source needed
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -114,15 +115,16 @@ def angle_of_repose_at(azimuth_deg: float) -> Callable[[PileReading], Value]:
     return lambda reading: mean_value(list(reading.view_deg(azimuth_deg)), "deg")
 
 
+of_angle = partial(of_pile, group=PILE, possible=ANGLE)
+
+
 def view(name: str, azimuth_deg: float) -> Observable:
     """The observable "one view, mean of both flanks" from ``azimuth_deg``, as ``<name>@<azimuth>``."""
-    return of_pile(
+    return of_angle(
         f"{name}@{azimuth_deg:g}",
         "deg",
         angle_of_repose_at(azimuth_deg),
         SHAPE,
-        group=PILE,
-        possible=ANGLE,
         doc=f"Silhouette flank fit, view from azimuth {azimuth_deg:g}°, mean of both flanks.",
         scanned=True,
     )
@@ -208,77 +210,49 @@ def height_profile(
 
 
 OBSERVABLES = (
-    of_pile(
+    of_angle(
         "angle_of_repose_deg",
         "deg",
         angle_of_repose,
         SHAPE,
-        group=PILE,
         label="angle of repose, silhouette",
         estimator=True,
-        possible=ANGLE,
         scanned=True,
     ),
-    of_pile(
-        "angle_of_repose_left_deg",
-        "deg",
-        angle_of_repose_left,
-        SHAPE,
-        ASYMMETRY,
-        group=PILE,
-        scanned=True,
-        possible=ANGLE,
-    ),
-    of_pile(
-        "angle_of_repose_right_deg",
-        "deg",
-        angle_of_repose_right,
-        SHAPE,
-        ASYMMETRY,
-        group=PILE,
-        scanned=True,
-        possible=ANGLE,
-    ),
+    of_angle("angle_of_repose_left_deg", "deg", angle_of_repose_left, SHAPE, ASYMMETRY, scanned=True),
+    of_angle("angle_of_repose_right_deg", "deg", angle_of_repose_right, SHAPE, ASYMMETRY, scanned=True),
     *(view("angle_of_repose_deg", azimuth) for azimuth in (0, 45, 90, 135)),
-    of_pile(
+    of_angle(
         "angle_of_repose_above_one_body_deg",
         "deg",
         angle_of_repose_above_one_body,
         SHAPE,
-        group=PILE,
         label="angle of repose, silhouette above one body",
         estimator=True,
-        possible=ANGLE,
     ),
-    of_pile(
+    of_angle(
         "angle_of_repose_cone_deg",
         "deg",
         angle_of_repose_cone,
         SHAPE,
-        group=PILE,
         label="angle of repose, mean cone",
         estimator=True,
-        possible=ANGLE,
     ),
-    of_pile(
+    of_angle(
         "angle_of_repose_mass_cone_deg",
         "deg",
         angle_of_repose_mass_cone,
         SHAPE,
-        group=PILE,
         label="angle of repose, centre-of-mass cone",
         estimator=True,
-        possible=ANGLE,
     ),
-    of_pile(
+    of_angle(
         "angle_of_repose_volume_cone_deg",
         "deg",
         angle_of_repose_volume_cone,
         SHAPE,
-        group=PILE,
         label="angle of repose, volume cone",
         estimator=True,
-        possible=ANGLE,
     ),
     of_pile("apex_height_m", "m", apex_height, SHAPE, PACKING, group=PILE, scanned=True, possible=AT_LEAST_0),
     of_pile("centre_height_m", "m", centre_height, SHAPE, PACKING, group=PILE, scanned=True, possible=AT_LEAST_0),
