@@ -364,6 +364,8 @@ class _Weigher:
     def __init__(self, emulator: Emulator, data: Data) -> None:
         self._emulator, self._data = emulator, data
         self.row = emulator.row()
+        # Σ is known condition by condition, each by as many pours.
+        self._freedom = emulator.freedom * len(emulator.squashes)
 
     def at(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Means and variances (n, D) of the data under ``rows``."""
@@ -391,11 +393,9 @@ class _Weigher:
 
     def log_t(self, mean: FloatArray, variance: FloatArray) -> FloatArray:
         """Log densities (n,) of the data."""
-        # Σ is known condition by condition, each by as many pours.
-        freedom = self._emulator.freedom * len(self._emulator.squashes)
         _, left, variance, _, slopes = self.bent(mean, variance)
         instrument = np.broadcast_to(self._data.instrument, (*left.shape, self._data.instrument.shape[1]))
-        return log_t(left, variance, np.concatenate([slopes, instrument], axis=2), freedom)
+        return log_t(left, variance, np.concatenate([slopes, instrument], axis=2), self._freedom)
 
     def densities(self, rows: FloatArray) -> FloatArray:
         """Log densities (n,) of the data under ``rows``."""
@@ -436,7 +436,7 @@ class _Weigher:
             mean,
             self._emulator.at(rows[best : best + 1])[1][0],
             float(logsumexp(logs)) - math.log(len(logs)),
-            float(stats.f.sf(square, len(d), self._emulator.freedom)),
+            float(stats.f.sf(square, len(d), self._freedom)),
         )
 
 

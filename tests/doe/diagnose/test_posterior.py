@@ -349,6 +349,16 @@ def test_data_far_off_every_model_are_unlikely_under_all():
     assert judged(taught, 2.0 * unit(0)).fits["push"].p > 0.05
 
 
+def test_how_unlikely_data_are_counts_the_pours_of_both_conditions():
+    """Each condition's covariance is known by ν degrees of freedom, so an F of 2 ν, as in the density."""
+    z = 0.7 * np.ones(SIZE)
+    taught = emulator({}, freedom=12)
+    variance = 1.0 / 6.0 + 1.0 / BASE
+    expected = stats.f.sf(0.7**2 / variance, SIZE, 2 * 12)
+    assert 0.01 < expected < 0.2
+    assert judged(taught, z).fits["base"].p == pytest.approx(expected, rel=1e-6)
+
+
 def base_of(taught):
     return taught.at(taught.row()[None])
 
