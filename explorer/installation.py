@@ -15,12 +15,13 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
+
+from solver import available_cores, memory_limits
 
 DISTRIBUTION = "repose-explorer"
 PYTHONS = ((3, 11), (3, 12))
@@ -225,21 +226,20 @@ def _gpu() -> Finding:
 
 
 def _cores() -> Finding:
-    cores = os.cpu_count() or 1
-    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else cores
+    cores, allowed = os.cpu_count() or 1, available_cores()
     return Finding(
         "CPU cores",
-        cores > 1 and allowed == cores,
+        allowed > 1,
         f"{cores}" if allowed == cores else f"{allowed} of {cores} allowed to this process",
         "the page's frame rate and the speed of studies: page, live pour and workers share cores",
-        "two cores or more" if allowed == cores else f"--threads {allowed}",
+        "two cores or more",
     )
 
 
 def _memory() -> Finding:
     from explorer.study.duration import WORKER_GB
 
-    wanted = PAGE_GB + (os.cpu_count() or 1) * WORKER_GB
+    wanted = PAGE_GB + available_cores() * WORKER_GB
     there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9
     allowed = min((limit / 1e9 for limit in memory_limits()), default=there)
     found = f"{there:.1f} GB" if allowed >= there else f"{allowed:.1f} of {there:.1f} GB allowed to this process"
@@ -250,37 +250,6 @@ def _memory() -> Finding:
         "studies on all cores",
         "--threads 1, or more memory",
     )
-
-
-def memory_limits(own: Path = Path("/proc/self/cgroup"), tree: Path = Path("/sys/fs/cgroup")) -> Iterator[int]:
-    """Limits [bytes] of the control groups around this process, such as that of a container; none elsewhere than Linux.
-
-    Parameters
-    ----------
-    own
-        What names the groups of a process, of version 2 (``0::/path``) or 1 (``4:memory:/path``).
-    tree
-        Where groups are mounted. In a container that sees itself as the root of it, the path names the host's groups
-        and the limit stands in the root.
-
-    Returns
-    -------
-    One number per limit; version 1 has a huge one where there is none.
-    """
-    try:
-        lines = own.read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return
-    for line in lines:
-        _, controllers, place = line.split(":", 2)
-        if controllers and "memory" not in controllers.split(","):
-            continue
-        root, name = (tree / "memory", "memory.limit_in_bytes") if controllers else (tree, "memory.max")
-        group = root / place.lstrip("/")
-        for folder in (group, *group.parents):
-            if folder.is_relative_to(root):
-                with suppress(OSError, ValueError):  # no such file, or "max"
-                    yield int((folder / name).read_text(encoding="utf-8"))
 
 
 def _folders(solver: SolverTrial) -> Iterator[Finding]:

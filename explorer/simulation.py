@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -20,7 +19,7 @@ from explorer.files.run_folder import appearing, write_result, write_run
 from explorer.files.run_result import BenchTestResult, SimulationResult, bench_test_result, simulation_result
 from explorer.scene.file import load_scene, with_settings
 from explorer.terminal.pours import RunTable
-from solver import Job, Record, Scene, check_scheduler, executor, run_pours
+from solver import Job, Record, Scene, available_cores, check_scheduler, executor, run_pours
 from solver.arch import chosen
 from solver.pours.checkpoint import Checkpoint, read_checkpoint
 from solver.rigs import BENCH_RIGS
@@ -174,7 +173,7 @@ def _poured(
     jobs = [Job(scene, s, tag=k, interrupted=simulation.interrupted) for k, s in enumerate(simulation.seeds)]
     if order.scheduler or (n > 1 and not order.watched and chosen() == "cpu"):
         # Nobody looks at them from within, so they run in processes of their own: in one, all wait for the slowest.
-        pool = stack.enter_context(executor(min(order.threads or os.cpu_count() or 1, n), order.scheduler))
+        pool = stack.enter_context(executor(min(order.threads or available_cores(), n), order.scheduler))
         return ((job.tag, finished) for job, finished in pool.run_queue(deque(jobs), [scene]))
     # A world is computed by one thread, and with one its kernels are those of the page and of workers.
     return run_pours(jobs, threads=1 if n == 1 else order.threads, on_sample=sample)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from solver.assets import AssetNotFoundError, asset_path, own_path
 from solver.effects import EFFECTS, SetUpEffect, Telltale
+from solver.machine import available_cores, memory_limits
 from solver.npz import NpzError, npz_arrays
 from solver.observables import OBSERVABLES, Value, observable_names, observables_in, observe
 from solver.observables.free_surface import slope_angle_deg
@@ -201,6 +202,7 @@ __all__ = [
     "actual",
     "all_names",
     "asset_path",
+    "available_cores",
     "begin_worker",
     "body_counts",
     "canonical",
@@ -216,6 +218,7 @@ __all__ = [
     "is_material",
     "json_schema",
     "load_material",
+    "memory_limits",
     "named",
     "naming_file",
     "npz_arrays",

@@ -30,6 +30,7 @@ import taichi as ti
 from taichi.lang import impl
 
 from solver.arch import chosen
+from solver.machine import available_cores
 from solver.params import ParameterError
 
 LANES_ON_CPU = 512
@@ -59,6 +60,8 @@ def init(threads: int | None = None) -> None:
             raise RuntimeError("Taichi belongs to the thread that called solver.backend.init first")
         return
     arch = getattr(ti, chosen())
+    if threads is None and (allowed := available_cores()) < (os.cpu_count() or 1):
+        threads = allowed  # Taichi counts the cores of the machine
     options = {} if threads is None else {"cpu_max_num_threads": threads}
     ti.set_logging_level(ti.ERROR)
     _ensure_kernel_folder()

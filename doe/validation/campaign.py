@@ -6,7 +6,6 @@ to the declared model, so that sets share them through the store. Two processes 
 work on one campaign.
 """
 
-import os
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -37,7 +36,7 @@ from doe.validation.scanner import Scanner
 from doe.validation.sets import NONE, OUT_OF_REACH, SetRow, append_rows, read_rows
 from doe.validation.truth import REPLICATES, ROOT, Case, Strengths, Truth, cases, strengths_of, truth_of
 from doe.validation.work_place import CampaignListener, OutOfTimeError, PourOrder, WorkPlace, complete
-from solver import EFFECTS, PHYSICS
+from solver import EFFECTS, PHYSICS, available_cores
 
 Data = dict[str, list[LaboratoryPour]]
 """Pours per condition."""
@@ -109,7 +108,7 @@ def run_campaign(order: CampaignOrder, say: Say, listener: CampaignListener | No
             store = Store(order.store or default_store())
             stack.callback(store.close)
             place = stack.enter_context(
-                WorkPlace(store, order.workers or os.cpu_count() or 1, deadline, order.scheduler, listener)
+                WorkPlace(store, order.workers or available_cores(), deadline, order.scheduler, listener)
             )
             try:
                 strengths = order.strengths or measured_strengths(order, laboratory, place, say)

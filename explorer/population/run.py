@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from explorer.background.progress import RunProgress, told_of_pauses
 from explorer.background.reporter import Reporter
 from explorer.files.output_file import check_vacant
 from explorer.population.process import populations
-from solver import Scene, executor, observable_names, run_queue
+from solver import Scene, available_cores, executor, observable_names, run_queue
 from solver.arch import chosen
 
 STAGE = "pours"
@@ -49,7 +48,7 @@ def pour_more(order: PoursOrder, reporter: Reporter) -> tuple[Population, ...]:
     if order.out is not None:
         check_vacant(order.out)
     path = order.store or default_store()
-    workers = min(order.threads or os.cpu_count() or 1, order.pours)
+    workers = min(order.threads or available_cores(), order.pours)
     with ExitStack() as stack:
         # Before anything is made: perhaps no scheduler answers.
         pool = stack.enter_context(executor(workers, order.scheduler)) if chosen() == "cpu" else None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from doe.stages import planned_runs
 from doe.store import RIG, Store, StoreError
 from doe.studies.profile import Profile
 from doe.studies.study import Study, with_profile
-from solver import Scene, body_counts, parameters, pour_rig, value
+from solver import Scene, available_cores, body_counts, parameters, pour_rig, value
 from solver.rigs.funnel import Funnel
 from solver.rigs.rig import Rig
 from solver.scenes.time_step import time_step
@@ -54,7 +53,7 @@ def duration_text(study: Study, profile: Profile, store: Path, workers: int | No
     One line. Runs that are stored already cost nothing, so it is an upper bound where they are; replacements of runs
     without a pile come on top.
     """
-    workers = workers or os.cpu_count() or 1
+    workers = workers or available_cores()
     counts = runs_of_scenes(study, profile)
     runs = sum(counts.values())
     least = "" if profile.resolution_deg is None else "at least "  # the pilot may ask for more

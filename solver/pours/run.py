@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -13,6 +12,7 @@ from solver import backend
 from solver.engine.state import Capacity
 from solver.engine.tables import wall_tables
 from solver.engine.world import Batch, compiled_in, wall_materials
+from solver.machine import available_cores
 from solver.params import ParameterError
 from solver.pours.checkpoint import Checkpoint, resumed
 from solver.pours.pour import Pour
@@ -97,12 +97,12 @@ def run_queue(
     is in flight. Pours of different contact laws run in a batch each.
     """
     backend.init(threads=threads)
-    slots = worlds or WORLDS_PER_THREAD * (threads or os.cpu_count() or 1)
+    slots = worlds or WORLDS_PER_THREAD * (threads or available_cores())
     by_law = {law: [one for one in room if one.contact.law == law] for law in {one.contact.law: None for one in room}}
     batches = {law: Batch(capacity_for(scenes, slots)) for law, scenes in by_law.items()}
     running: dict[tuple[str, int], tuple[Job, Pour]] = {}
     # A thread works on a contiguous share of the worlds: fill the shares evenly.
-    places = sorted(range(slots), key=lambda w: (w % max(1, slots // (threads or os.cpu_count() or 1)), w))
+    places = sorted(range(slots), key=lambda w: (w % max(1, slots // (threads or available_cores())), w))
     while True:
         while queue and len(running) < slots:
             job = queue.popleft()
@@ -149,7 +149,7 @@ def run_pours(
     if not jobs:
         return
     tagged = deque(replace(job, tag=k) for k, job in enumerate(jobs))
-    slots = min(len(jobs), worlds or WORLDS_PER_THREAD * (threads or os.cpu_count() or 1))
+    slots = min(len(jobs), worlds or WORLDS_PER_THREAD * (threads or available_cores()))
 
     def sample(job: Job, pour: Pour) -> None:
         if on_sample is not None:

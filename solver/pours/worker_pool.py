@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import logging
 import multiprocessing as mp
-import os
 import signal
 import sys
 import threading
@@ -28,6 +27,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from solver.machine import available_cores
 from solver.params import ParameterError
 from solver.scenes.scene import Scene
 
@@ -68,7 +68,7 @@ class WorkerPool:
     def __init__(self, workers: int | None = None) -> None:
         if workers is not None and (not isinstance(workers, int | np.integer) or workers < 1):
             raise ParameterError(f"workers {workers}: allowed: a whole number of at least 1")
-        self.workers = workers or os.cpu_count() or 1
+        self.workers = workers or available_cores()
         """How many pour at the same time."""
         self._processes: list[tuple[BaseProcess, Connection]] = []
 
@@ -179,7 +179,7 @@ def warm_up(rooms: Sequence[Sequence[Scene]], workers: int | None = None) -> Ite
     busy: dict[Connection, tuple[list[int], BaseProcess, float]] = {}
     try:
         while waiting or busy:
-            while waiting and len(busy) < (workers or os.cpu_count() or 1):
+            while waiting and len(busy) < (workers or available_cores()):
                 sizes, numbers = waiting.popleft()
                 if not missing(sizes):
                     yield from ((k, None) for k in numbers)

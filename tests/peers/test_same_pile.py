@@ -9,13 +9,12 @@ Fixed beforehand, from a pilot of 18 of our pours with other seeds (101 … 118)
 - Pours with the same feed, seeds 1 … 18. A pour that jams in either engine has no pile and is left out, counted.
 """
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
-from solver import Job, run_pours
+from solver import Job, available_cores, run_pours
 from tests.peers.piles import QUANTITIES, compared, of_ours, of_theirs, seed_pour
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("taichi")]
@@ -48,7 +47,7 @@ def check(engine, folder):
 
     ordered = [records[k] for k in sorted(records)]
     ours = [of_ours(record) for record in ordered]
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor(available_cores()) as pool:
         theirs = list(pool.map(theirs_of, ordered))
     pairs = [(one, other) for one, other in zip(ours, theirs, strict=True) if not (one.jammed or other.jammed)]
     jams = [sum(reading.jammed for reading in readings) for readings in (ours, theirs)]

@@ -350,13 +350,9 @@ def test_data_far_off_every_model_are_unlikely_under_all():
 
 
 def test_how_unlikely_data_are_counts_the_pours_of_both_conditions():
-    """Each condition's covariance is known by ν degrees of freedom, so an F of 2 ν, as in the density."""
-    z = 0.7 * np.ones(SIZE)
-    taught = emulator({}, freedom=12)
     variance = 1.0 / 6.0 + 1.0 / BASE
-    expected = stats.f.sf(0.7**2 / variance, SIZE, 2 * 12)
-    assert 0.01 < expected < 0.2
-    assert judged(taught, z).fits["base"].p == pytest.approx(expected, rel=1e-6)
+    expected = stats.f.sf(0.7**2 / variance, SIZE, 2 * 12)  # the covariance of each is known by 12
+    assert judged(emulator({}, freedom=12), 0.7 * np.ones(SIZE)).fits["base"].p == pytest.approx(expected, rel=1e-6)
 
 
 def base_of(taught):
@@ -364,8 +360,7 @@ def base_of(taught):
 
 
 def test_the_base_model_is_known_better_by_pours_of_effects_that_hardly_move_it():
-    still = emulator({"a": np.zeros(SIZE), "b": np.zeros(SIZE)}, variance=1e-3)
-    moving = emulator({"a": np.zeros(SIZE), "b": np.zeros(SIZE)}, variance=1e6)
+    still, moving = (emulator({"a": np.zeros(SIZE), "b": np.zeros(SIZE)}, variance=one) for one in (1e-3, 1e6))
     assert base_of(moving)[1] == pytest.approx(1.0 / 24.0, rel=1e-3)
     assert base_of(still)[1] == pytest.approx(1.0 / 48.0, rel=0.05)
 
@@ -400,9 +395,8 @@ def test_the_emulator_is_taught_by_pours():
     assert found.reached == (1.0,)
     # What z stands for is what was poured.
     for kind in ("base", "push"):
-        assert found.features(z[kind]) == pytest.approx(
-            np.concatenate([block.mean(axis=0) for block in sample.pours[kind]]), abs=0.15
-        )
+        poured = np.concatenate([block.mean(axis=0) for block in sample.pours[kind]])
+        assert found.features(z[kind]) == pytest.approx(poured, abs=0.15)
 
 
 def test_parameters_that_move_in_every_pour_cost_no_pours_of_their_own():

@@ -12,7 +12,6 @@ measured pours and the same seeds, is the error of their fits.
 import argparse
 import contextlib
 import math
-import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -30,6 +29,7 @@ from doe.validation.laboratory import read_laboratory
 from doe.validation.sets import HOLDOUT_GOOD, read_rows
 from doe.validation.truth import truth_of
 from doe.validation.work_place import WorkPlace
+from solver import available_cores
 
 DIVISIONS = 200
 
@@ -105,7 +105,7 @@ def main():
     with contextlib.ExitStack() as stack:
         store = Store(order.store or default_store())
         stack.callback(store.close)
-        place = stack.enter_context(WorkPlace(store, os.cpu_count() or 1))
+        place = stack.enter_context(WorkPlace(store, available_cores()))
         answers = Answers(laboratory, measured_strengths(order, laboratory, place, print), place, Budget())
         for case in order.asked(laboratory):
             if case.kind != "effect" or (found := ratios(answers, case, generator)) is None:

@@ -55,39 +55,31 @@ def test_a_new_user_is_ready_and_nothing_is_made(home, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("own", "limits", "expected"),
+    ("limits", "present", "found"),
     [
-        ("0::/\n", {"memory.max": "2000000000"}, [2000000000]),
-        ("0::/user/me\n", {"user/memory.max": "600000000", "user/me/memory.max": "max"}, [600000000]),
-        ("0::/docker/5f/on/the/host\n", {"memory.max": "700000000"}, [700000000]),
-        (
-            "9:pids:/\n4:cpu,memory:/box\n0::/\n",
-            {"memory/box/memory.limit_in_bytes": "800000000", "memory/memory.limit_in_bytes": str(2**63 - 4096)},
-            [800000000, 2**63 - 4096],
-        ),
-        ("0::/\n", {}, []),
+        ([], True, "25.3 GB"),
+        ([2**63 - 4096], True, "25.3 GB"),
+        ([2_000_000_000, 2**63 - 4096], True, "2.0 of 25.3 GB allowed to this process"),
+        ([600_000_000], False, "0.6 of 25.3 GB allowed to this process"),
     ],
 )
-def test_the_memory_of_a_container_is_its_limit(own, limits, expected, tmp_path, monkeypatch):
-    (tmp_path / "cgroup").write_text(own)
-    for name, content in limits.items():
-        file = tmp_path / "tree" / name
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(f"{content}\n")
-    found = list(installation.memory_limits(tmp_path / "cgroup", tmp_path / "tree"))
-    assert found == expected
-    monkeypatch.setattr(installation, "memory_limits", lambda: found)
+def test_the_memory_of_a_container_is_its_limit(limits, present, found, monkeypatch):
+    monkeypatch.setattr(installation, "memory_limits", lambda: iter(limits))
+    monkeypatch.setattr(installation, "available_cores", lambda: 2)
     monkeypatch.setattr("os.sysconf", {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 6171023}.get)
-    monkeypatch.setattr("os.cpu_count", lambda: 2)
     memory = installation._memory()
-    least = min(expected, default=2**62) / 1e9
-    assert memory.present == (least >= 1.0)
-    has = "25.3 GB" if least > 25.3 else f"{least:.1f} of 25.3 GB allowed to this process"
-    assert memory.found == f"{has}; a study on all cores takes 1.0 GB"
+    assert (memory.present, memory.found) == (present, f"{found}; a study on all cores takes 1.0 GB")
 
 
-def test_where_there_are_no_control_groups_the_memory_is_the_machine_s(tmp_path):
-    assert list(installation.memory_limits(tmp_path / "nothing", tmp_path)) == []
+@pytest.mark.parametrize(
+    ("allowed", "present", "found"),
+    [(8, True, "8"), (2, True, "2 of 8 allowed to this process"), (1, False, "1 of 8 allowed to this process")],
+)
+def test_the_cores_of_a_container_are_its_quota(allowed, present, found, monkeypatch):
+    monkeypatch.setattr("os.cpu_count", lambda: 8)
+    monkeypatch.setattr(installation, "available_cores", lambda: allowed)
+    cores = installation._cores()
+    assert (cores.present, cores.found) == (present, found)
 
 
 def test_taichi_that_crashes_and_folders_that_take_nothing(home, tmp_path, monkeypatch):
