@@ -129,7 +129,7 @@ def design(
         )
     if report is not None:
         check_vacant(report, "--report")
-    check_power(sigma, effect)
+    check_power(kind, sigma, effect)
     file = read_factors(asset_path("designs", factors))
     order = DesignOrder(
         kind,

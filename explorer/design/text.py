@@ -9,7 +9,7 @@ import math
 from typing import Any
 
 from doe.analysis.mixture import bearable_order, mixture_terms
-from doe.designs import factor_letters
+from doe.designs import DESIGNS, factor_letters
 from doe.record import plain
 from explorer.design.factors_file import DesignFactor, FactorsFile
 from explorer.design.plan_result import OF_NAMES, TERMS, beyond, blocks, planned_order, planned_power
@@ -35,11 +35,13 @@ from explorer.terminal.text_table import text_table
 from explorer.units import counted, number
 
 
-def check_power(sigma: float | None, effect: float | None) -> None:
-    """Refuse what is neither the standard deviation of a run nor a change of its result."""
+def check_power(design: str, sigma: float | None, effect: float | None) -> None:
+    """Refuse what is neither the standard deviation of a run nor a change of its result, and both for a mixture."""
     for option, value in (("--sigma", sigma), ("--effect", effect)):
         if value is not None and not 0 < value < math.inf:
             raise CommandError(f"{option} {value:g}: allowed: a positive number")
+        if value is not None and design in DESIGNS and DESIGNS[design].mixture:
+            raise CommandError(f"{option}: is not for {design}, whose parts have no effects of their own")
 
 
 def plan_result(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: float | None) -> dict[str, Any]:

@@ -274,7 +274,7 @@ class SheetOrder:
 
 def sheet_result(order: DesignOrder, asked: SheetOrder) -> CommandResult:
     """`explorer design`: the runs of a design as a sheet to fill in."""
-    check_power(asked.sigma, asked.effect)
+    check_power(order.design, asked.sigma, asked.effect)
     file = read_factors(asset_path("designs", asked.factors))
     plan = make_plan(order, file)
     name = f"runs{WORKBOOK if asked.workbook else '.csv'}"

@@ -426,6 +426,7 @@ def test_parts_whose_ranges_cannot_be_one_whole_are_refused(tmp_path, process):
     process.write_text(PROCESS.replace("170", "175"), encoding="utf-8")
     assert "high minus low differs between the parts (time 10, temperature 5)" in refused(explorer(*order))
     many = ("design", "lhs", "--factors", process, "--lattice", 2, "--out", tmp_path / "x.csv")
+    assert "--sigma: is not for mixture, whose" in refused(explorer(*order, "--sigma", 1))
     assert "--lattice: is not for lhs; allowed with: mixture" in refused(explorer(*many))
 
 
