@@ -49,9 +49,9 @@ class FeedTable(TomlTable):
     region: Literal["cylinder"] = "cylinder"
     region_radius: Annotated[float | str, Scalar()] | None = None
     region_z: Annotated[tuple[float, float], Vector(2, "m")] | None = None
-    """From … to; it begins at the rig's feed opening."""
+    """From … to; must begin at the rig's feed opening."""
     batch_interval: Annotated[float | str, Scalar()] | None = None
-    """Time between two batches; becomes the interval at which a run decides."""
+    """Time between two batches; also the interval at which a run is sampled."""
     velocity: Annotated[tuple[float, float, float], Vector(3, "m/s")] | None = None
     """Straight down: [0, 0, −v]."""
     orientation: Literal["random"] = "random"
@@ -92,10 +92,10 @@ class ConditionTable(TomlTable):
     )
     """Photographs of its piles, by file name or as tables."""
     mean_of: Annotated[int, Whole(1)] = 1
-    """Every value of the table is the mean of so many pours."""
+    """Number of pours that every value in the table is the mean of."""
     scan: ScanSettings = ScanSettings()
     turned: StrictBool = False
-    """The rig stood turned by 180° on its bench, and so did all that is read off it."""
+    """The rig stood turned by 180° on its bench, and so do all readings."""
 
 
 def in_rig(base: Scene, name: str) -> Scene:

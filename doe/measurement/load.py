@@ -52,9 +52,9 @@ class MeasurementFile(TomlTable):
     material: str
     """The declared base model: a material file or a shipped material."""
     parameters: dict[str, ParameterTable] = Field(default_factory=dict)
-    """What calibration may move."""
+    """Parameters that calibration may change."""
     uncertainty: dict[str, Annotated[float | str, Scalar()]] = Field(default_factory=dict)
-    """Observable → standard deviation of one value, where replicates cannot give it."""
+    """Observable → standard deviation of one reading, where replicates cannot give it."""
     condition: list[Annotated[Settings, Like(ConditionTable)]] = Field(default_factory=list)
 
 

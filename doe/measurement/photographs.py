@@ -39,15 +39,15 @@ class PhotographTable(TomlTable):
     """One picture."""
 
     file: str
-    """Beside measurement.toml."""
+    """File name, beside measurement.toml."""
     replicate: Annotated[int, Whole(1)] | None = None
-    """The place in the list where it is not stated."""
+    """Number of the replicate; by default the place in the list."""
     azimuth: Annotated[float, Number()] = 0.0
-    """Of the view [°]; 0 looks along +y."""
+    """Azimuth of the view [°]; 0 looks along +y."""
     pixel: Annotated[float, Quantity("m", above=0.0)] | None = None
-    """Length of a pixel; with it the height is read as well."""
+    """Size of a pixel; needed to read heights."""
     base_line: Annotated[tuple[float, float], Vector(2)] | None = None
-    """Of the plate at the left and at the right edge, in pixels from the top."""
+    """Rows of the plate's surface at the left and right edges, in pixels from the top."""
 
 
 def photograph_values(folder: Path, images: Sequence[PhotographTable]) -> tuple[Values, tuple[str, ...]]:

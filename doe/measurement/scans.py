@@ -53,11 +53,11 @@ class ScanSettings:
     __pydantic_config__: ClassVar[ConfigDict] = TABLE
 
     unit: Literal["m", "cm", "mm", "um"] = "m"
-    """Of a surface and of points."""
+    """Unit of surfaces and points."""
     pixel: Annotated[float, Quantity("m", above=0.0)] | None = None
-    """Of an image: edge of a pixel."""
+    """Images: size of a pixel."""
     step: Annotated[float, Quantity("m", above=0.0)] | None = None
-    """Of an image: height of one count."""
+    """Images: height of one count."""
     plate: Annotated[tuple[float, float, float], Vector(3)] | None = None
     """The plate z = a + b x + c y, in metres; found from the bare plate in the scan where not stated."""
     axis: Annotated[tuple[float, float], Vector(2)] | None = None
@@ -66,7 +66,7 @@ class ScanSettings:
     axis_error: Annotated[float, Quantity("m", above=0.0)] = AXIS_ERROR
     """Standard deviation of each coordinate of the axis."""
     grid: Annotated[float, Quantity("m", above=0.0)] | None = None
-    """Resolution; the spacing of the points where not stated."""
+    """Resolution; by default the spacing of the points."""
     noise: Annotated[float, Quantity("m", above=0.0)] | None = None
     """Standard deviation of one height, where it is known."""
 

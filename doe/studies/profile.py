@@ -23,7 +23,7 @@ class Profile(Record):
 
     name: str = ""
     spheres: str = "standard"
-    """Resolution of the shapes."""
+    """Resolution of the bodies' shapes."""
     mass: Annotated[float, Quantity("kg", above=0.0)] = 0.030
     pilot_runs: Annotated[int, Whole(3)] = 20
     change_runs: Annotated[int, Whole(1)] = 10
@@ -35,7 +35,7 @@ class Profile(Record):
     surface_replicates: Annotated[int, Whole(1)] = 3
     verification_runs: Annotated[int, Whole(3)] = 12
     resolution_deg: Annotated[float, Number(above=0.0)] | None = None
-    """The pilot sizes the replicates so that this difference shows."""
+    """Difference that the replicates, sized by the pilot, have to resolve."""
     max_replicates: Annotated[int, Whole(1)] = 12
     reach_runs: Annotated[int, Whole(0)] = 3
-    """Pours of each corner of the factors that shows whether the target can be reached; 0: none."""
+    """Pours at each corner of the factors, to see whether the target can be reached; 0: none."""

@@ -205,7 +205,7 @@ class LevelsTable(TomlTable):
 
     name: str
     path: str
-    """Of the parameter that is varied."""
+    """Path of the varied parameter."""
     low: Annotated[float | str, Scalar()]
     high: Annotated[float | str, Scalar()]
     reference: Annotated[float | str, Scalar()]
@@ -213,7 +213,7 @@ class LevelsTable(TomlTable):
 
 
 class ChangeTable(TomlTable):
-    """A ``[[change]]``: parameters that are declared otherwise, for the choice of the estimator."""
+    """A ``[[change]]``: other values of parameters, for choosing the estimator."""
 
     name: str
     values: Settings
@@ -264,15 +264,15 @@ class StudyFile(TomlTable):
     target: list[Target] = Field(default_factory=list)
     """What was measured."""
     factor: list[LevelsTable] = Field(default_factory=list)
-    """Screened, then calibrated; numbers."""
+    """Factors that are screened, then calibrated; numbers."""
     assumption: list[LevelsTable] = Field(default_factory=list)
-    """Screened beside the factors: what nobody published; numbers or named levels."""
+    """Factors that are screened only, for nobody published them; numbers or named levels."""
     fallback: Annotated[tuple[str, ...], Names()] = ()
-    """Factors that are calibrated where the screening finds too few, the first ones first."""
+    """Factors that are calibrated if the screening selects too few, in this order."""
     dummies: Annotated[int, Whole(1)] | None = None
-    """Columns of a Plackett–Burman table that stay free of factors, at least; 3 where nothing is said."""
+    """Least number of dummy columns of a Plackett–Burman table; 3 by default."""
     estimators: Annotated[tuple[str, ...], Names()] | None = None
-    """Candidates for the screening's response; the observables of the targets always belong to them."""
+    """Candidates for the screening's response; the targets' observables are always among them."""
     seed: Annotated[int, Whole(0)] = 1
     screening: DesignTable = DesignTable()
     assumptions: DesignTable = DesignTable()
@@ -283,7 +283,7 @@ class StudyFile(TomlTable):
     profile: dict[str, Profile] = Field(default_factory=dict)
     """Name → shapes, mass and numbers of runs."""
     stage: dict[str, Settings] = Field(default_factory=dict)
-    """Stages of other packages (``doe/stages/stage.py``), each with what it takes."""
+    """Stages of other packages (``doe/stages/stage.py``), each with its options."""
 
 
 def load_study(name: str) -> Study:

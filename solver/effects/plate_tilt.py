@@ -18,8 +18,8 @@ from solver.params import param
 class PlateTilt(SetUpEffect):
     """Tilt of plate and funnel; ``tilt_x`` and ``tilt_y`` are the amplitudes."""
 
-    tilt_x: float = param(0.0, unit="deg", low=-20.0, high=20.0, doc="Slope down along +x.")
-    tilt_y: float = param(0.0, unit="deg", low=-20.0, high=20.0, doc="Slope down along +y.")
+    tilt_x: float = param(0.0, unit="deg", low=-20.0, high=20.0, doc="Downward slope along +x.")
+    tilt_y: float = param(0.0, unit="deg", low=-20.0, high=20.0, doc="Downward slope along +y.")
 
     name = "plate_tilt"
     amplitudes = ("tilt_x", "tilt_y")

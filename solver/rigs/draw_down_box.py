@@ -32,13 +32,13 @@ class DrawDownBox(PourRig):
     """Dimensions of the rig and the mass that is filled in."""
 
     width: float = param(0.240, unit="m", low=0.01, high=2.0, doc="Inner width of the upper box (x).")
-    depth: float = param(0.080, unit="m", low=0.002, high=2.0, doc="Distance of front and back wall (y).")
+    depth: float = param(0.080, unit="m", low=0.002, high=2.0, doc="Distance between the front and back walls (y).")
     box_height: float = param(0.200, unit="m", low=0.005, high=2.0, doc="Height of the upper box above its shelf.")
-    shelf_height: float = param(0.200, unit="m", low=0.01, high=2.0, doc="Shelf above the plate.")
+    shelf_height: float = param(0.200, unit="m", low=0.01, high=2.0, doc="Height of the shelf above the plate.")
     slot_width: float = param(0.090, unit="m", low=0.002, high=1.0, doc="Width of the slot in the shelf (x).")
-    mass: float = param(0.300, unit="kg", low=1e-5, high=50.0, doc="Mass that is filled in.")
+    mass: float = param(0.300, unit="kg", low=1e-5, high=50.0, doc="Filled mass.")
     domain_half_width: float = param(
-        0.4, unit="m", low=0.05, high=10.0, doc="Bodies further than this from the middle are taken out."
+        0.4, unit="m", low=0.05, high=10.0, doc="Bodies farther than this from the middle are removed."
     )
     wall: str = "rigid_sieve_plate"
 

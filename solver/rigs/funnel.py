@@ -31,10 +31,10 @@ class Funnel(PourRig):
     inlet_diameter: float = param(0.114, unit="m", low=0.01, high=2.0, doc="Inner diameter of the feed opening.")
     outlet_diameter: float = param(0.030, unit="m", low=0.003, high=2.0, doc="Inner diameter of the outlet.")
     cone_height: float = param(0.130, unit="m", low=0.005, high=2.0, doc="Length of the funnel along its axis.")
-    outlet_height: float = param(0.065, unit="m", low=0.005, high=2.0, doc="Outlet above the plate.")
-    mass: float = param(0.030, unit="kg", low=1e-5, high=10.0, doc="Mass that is poured.")
+    outlet_height: float = param(0.065, unit="m", low=0.005, high=2.0, doc="Height of the outlet above the plate.")
+    mass: float = param(0.030, unit="kg", low=1e-5, high=10.0, doc="Poured mass.")
     domain_half_width: float = param(
-        0.4, unit="m", low=0.05, high=10.0, doc="Bodies further than this from the axis are taken out."
+        0.4, unit="m", low=0.05, high=10.0, doc="Bodies farther than this from the axis are removed."
     )
     wall: str = "rigid_sieve_plate"
 

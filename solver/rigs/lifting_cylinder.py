@@ -31,10 +31,10 @@ class LiftingCylinder(PourRig):
     diameter: float = param(0.080, unit="m", low=0.005, high=2.0, doc="Inner diameter of the cylinder.")
     cylinder_height: float = param(0.150, unit="m", low=0.005, high=2.0, doc="Height of the cylinder.")
     lift_speed: float = param(0.020, unit="m/s", low=1e-3, high=1.0, doc="Speed at which the cylinder is lifted.")
-    lift_height: float = param(0.150, unit="m", low=0.01, high=2.0, doc="How far it is lifted; then it stands still.")
-    mass: float = param(0.030, unit="kg", low=1e-5, high=10.0, doc="Mass that is filled in.")
+    lift_height: float = param(0.150, unit="m", low=0.01, high=2.0, doc="Height to which it is lifted and then held.")
+    mass: float = param(0.030, unit="kg", low=1e-5, high=10.0, doc="Filled mass.")
     domain_half_width: float = param(
-        0.4, unit="m", low=0.05, high=10.0, doc="Bodies further than this from the axis are taken out."
+        0.4, unit="m", low=0.05, high=10.0, doc="Bodies farther than this from the axis are removed."
     )
     wall: str = "rigid_sieve_plate"
 

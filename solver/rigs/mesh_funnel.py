@@ -41,12 +41,12 @@ MOST_FACES = 20_000
 class MeshFunnel(PourRig):
     """The mesh, where it stands, and the mass that is poured."""
 
-    mesh: str = param("square_hopper", files=SUFFIXES, doc="File of the funnel's surface, z up; or a shipped mesh.")
+    mesh: str = param("square_hopper", files=SUFFIXES, doc="Surface of the funnel, z up: a file or a shipped mesh.")
     unit: str = param("mm", choices=tuple(LENGTH_UNITS), doc="Unit of the coordinates in the file.")
     outlet_height: float = param(0.065, unit="m", low=0.005, high=2.0, doc="Lowest point of the mesh above the plate.")
-    mass: float = param(0.030, unit="kg", low=1e-5, high=10.0, doc="Mass that is poured.")
+    mass: float = param(0.030, unit="kg", low=1e-5, high=10.0, doc="Poured mass.")
     domain_half_width: float = param(
-        0.4, unit="m", low=0.05, high=10.0, doc="Bodies further than this from the axis are taken out."
+        0.4, unit="m", low=0.05, high=10.0, doc="Bodies farther than this from the axis are removed."
     )
     wall: str = "rigid_sieve_plate"
 

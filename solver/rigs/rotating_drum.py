@@ -40,15 +40,15 @@ class RotatingDrum(PourRig):
     """Dimensions, filling, speed and the time over which the free surface is averaged."""
 
     diameter: float = param(0.200, unit="m", low=0.005, high=5.0, doc="Inner diameter of the drum.")
-    axial_length: float = param(0.080, unit="m", low=0.002, high=5.0, doc="Distance of the end plates (y).")
+    axial_length: float = param(0.080, unit="m", low=0.002, high=5.0, doc="Distance between the end plates (y).")
     filled_volume: float = param(8e-4, unit="m3", low=1e-9, high=10.0, doc="Volume of the bed at rest, pores included.")
-    packing: float = param(0.55, low=0.1, high=1.0, doc="Solid fraction by which the filled volume becomes a mass.")
-    speed_rpm: float = param(15.0, unit="rpm", low=0.1, high=300.0, doc="Speed of rotation.")
+    packing: float = param(0.55, low=0.1, high=1.0, doc="Solid fraction that converts the filled volume into a mass.")
+    speed_rpm: float = param(15.0, unit="rpm", low=0.1, high=300.0, doc="Rotation speed.")
     transient_turns: float = param(0.5, low=0.0, high=100.0, doc="Turns before the free surface is measured.")
-    averaging_turns: float = param(1.0, low=0.05, high=1000.0, doc="Turns over which it is averaged.")
+    averaging_turns: float = param(1.0, low=0.05, high=1000.0, doc="Turns over which the free surface is averaged.")
     end_plates: str = param(
         "turning",
-        doc="turning: the end plates turn with the shell; standing: they do not.",
+        doc="turning: the end plates rotate with the shell; standing: they do not.",
         choices=("turning", "standing"),
     )
     wall: str = "rigid_sieve_plate"

@@ -140,7 +140,7 @@ def body_parameters(body: Body) -> dict[str, Parameter]:
             "1",
             0,
             0,
-            "How the bodies' linear sizes scatter about the declared one.",
+            "Distribution of the bodies' linear sizes about the declared one.",
             choices=KINDS,
         ),
         f"{prefix}.size_spread": Parameter(

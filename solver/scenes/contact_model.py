@@ -27,8 +27,8 @@ class ContactModel:
 
     law: str = param(
         HertzMindlin.name,
-        doc="Force between two bodies that overlap: hertz_mindlin, or linear_spring_dashpot with a stiffness that does "
-        "not change during a contact.",
+        doc="Force between two bodies that overlap: hertz_mindlin, or linear_spring_dashpot, of constant stiffness "
+        "during a contact.",
         choices=CONTACT_LAWS,
     )
     characteristic_velocity: float = param(
@@ -36,14 +36,14 @@ class ContactModel:
         unit="m/s",
         low=1e-3,
         high=100.0,
-        doc="Speed of impact at which linear springs store as much as Hertz's at the same overlap; "
-        "linear_spring_dashpot alone reads it.",
+        doc="Impact speed at which a linear spring stores as much energy as Hertz's at the same overlap; used by "
+        "linear_spring_dashpot only.",
         scale="log",
     )
     clump_rule: str = param(
         "body_mass",
         doc="Damping by the mass of the whole body (body_mass: EDEM, LIGGGHTS) or by the mass that acts at the contact "
-        "(local_mass: the declared restitution at any tilt); local_mass_shared: the contacts of two bodies act as one.",
+        "(local_mass: the declared restitution at any tilt; local_mass_shared: all contacts of two bodies act as one).",
         choices=CLUMP_RULES,
     )
     tangential_law: str = param(
@@ -54,7 +54,7 @@ class ContactModel:
     )
     tangential_dashpot: str = param(
         "capped",
-        doc="Whether Coulomb's limit holds for tangential spring and dashpot (capped) or the spring alone (uncapped: "
+        doc="Coulomb's limit caps the tangential spring and dashpot together (capped), or the spring alone (uncapped: "
         "LIGGGHTS).",
         choices=TANGENTIAL_DASHPOTS,
     )

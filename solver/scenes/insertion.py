@@ -38,12 +38,17 @@ class Insertion:
         unit="s",
         low=0.0,
         high=1.0,
-        doc="Bodies may enter this long before they are due; numerics.sample_interval: a batch holds what comes next.",
+        doc="How long before it is due a body may enter. At numerics.sample_interval each batch is filled for the "
+        "interval ahead.",
     )
     drop_speed: float = param(0.5, unit="m/s", low=0.0, high=10.0, doc="Downward speed of a body where it enters.")
-    region_radius: float = param(0.045, unit="m", low=0.002, high=1.0, doc="Radius of the feed.")
+    region_radius: float = param(0.045, unit="m", low=0.002, high=1.0, doc="Radius of the region where bodies enter.")
     region_height: float = param(
-        0.060, unit="m", low=0.002, high=1.0, doc="Height of the feed; longer bodies stick out of its top."
+        0.060,
+        unit="m",
+        low=0.002,
+        high=1.0,
+        doc="Height of the region where bodies enter; longer bodies stick out of its top.",
     )
 
 

@@ -122,7 +122,7 @@ class BodyTable(TomlTable):
 
     name: str = ""
     material: str | None = None
-    """By default that of the body's name."""
+    """By default the material of the body's name."""
     mass_fraction: Annotated[float, Quantity("1")] = 1.0
     """Share of the mass, 0 … 1."""
     size_distribution: Annotated[str, Scalar()] = "none"
@@ -131,7 +131,7 @@ class BodyTable(TomlTable):
     size: SizeTable | None = None
     """Measured diameters, instead of distribution and spread."""
     file: str | None = None
-    """A file with one such [[body]], as ``explorer shape`` writes it; keys that stand beside it count before its."""
+    """A file with one such [[body]], as ``explorer shape`` writes it; keys given beside it take precedence."""
     shape: Settings | None = None
     """The solid: { ellipsoid = […] }, cylinder, box, sphere, or { mesh = "grain.stl", unit = "mm" }."""
     spheres: Annotated[int | str, Scalar()] = "standard"
@@ -139,15 +139,15 @@ class BodyTable(TomlTable):
     sphere_centres: Annotated[tuple[tuple[float, float, float], ...], Rows(3, "m")] = ()
     sphere_radii: Annotated[tuple[float, ...], Vector(unit="m", above=0.0)] = ()
     mass: Annotated[float, Quantity("kg", above=0.0)] | None = None
-    """Of bodies by their spheres [kg]."""
+    """Mass of a body declared by its spheres [kg]."""
     inertia: Annotated[tuple[float, float, float], Vector(3, above=0.0)] | None = None
     """Principal moments [kg m²]."""
     density: Annotated[float, Quantity("kg/m3", above=0.0)] | None = None
     """With it, mass and inertia follow the material's density."""
     mesh: str | None = None
-    """Surface that is drawn for bodies by their spheres."""
+    """Surface drawn for a body declared by its spheres."""
     unit: str | None = None
-    """In which the mesh is written."""
+    """Unit of the mesh's coordinates."""
     fit: FitTable | None = None
 
 
@@ -168,14 +168,14 @@ class MaterialFile(TomlTable):
     """Name → density, and two of youngs_modulus, shear_modulus, poisson_ratio."""
     body: list[Annotated[Settings, Like(BodyTable)]]
     pair: dict[str, dict[str, Annotated[Settings, Shaped(lambda: parameters_schema(Pair))]]]
-    """Of every two materials that can touch: static_friction, restitution."""
+    """For every two materials that can touch: static_friction, restitution."""
     wall: str | None = None
     """Material of funnel and plate; by default the one that no body is made of."""
     gravity: Annotated[tuple[float, float, float], Vector(3, "m/s2")] = (0.0, 0.0, -9.81)
     contact_law: str | None = None
     """The same as law in [contact]."""
     assumed: Annotated[tuple[str, ...], Names()] = ()
-    """Paths of values that nobody measured."""
+    """Paths of values that were not measured."""
     measured: Settings = Field(default_factory=dict)
     """Where measured values come from, as ``explorer lab`` writes it."""
     rig: RigTable = Field(default_factory=dict)
