@@ -56,7 +56,7 @@ class CapillaryBridge(ContactEffect):
     amplitudes = ("surface_tension",)
     strongest = 0.072
     literature = "clean water at 20 °C, 0.072 N/m, is the largest of the liquids that wet plant material"
-    lever = "a moisture series; soap in the water lowers γ; the pull outlasts the touch"
+    lever = "a moisture series; a surfactant lowers γ; attraction outlasts contact"
     telltales = (Telltale.SHAPE, Telltale.FLOW)
     revision = 2
     stage = Stage.ADHESION

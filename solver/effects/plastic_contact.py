@@ -45,7 +45,7 @@ class PlasticContact(ContactEffect):
     amplitudes = ("plasticity",)
     strongest = 0.8
     literature = "λ = 0.2–0.8 for food and soft plant material in EEPA calibrations"
-    lever = "drop test at several heights: a rebound lower than the damping explains, and alike at every speed"
+    lever = "drop test at several heights: a rebound lower than the damping explains, by the same factor at every speed"
     telltales = (Telltale.SHAPE, Telltale.FLOW)
     revision = 3
     stage = Stage.NORMAL
