@@ -301,7 +301,7 @@ def _weight(prior: float, log_evidence: float, temperature: float) -> float:
 def _nodes_of(emulator: Emulator, effect: str) -> _Nodes:
     """All amplitudes, signs and directions of ``effect``."""
     ways = [(number, way) for number, way in enumerate(emulator.ways) if way.effect == effect]
-    rows, natural, ends, owner, multiple = [], [], [], [], []
+    nodes = []
     planar = [number for number, way in ways if way.angle is not None]
     if len(planar) == len(ANGLES):
         by_angle = {emulator.ways[number].angle: number for number in planar}
@@ -311,21 +311,15 @@ def _nodes_of(emulator: Emulator, effect: str) -> _Nodes:
             angle = 2.0 * math.pi * direction / DIRECTIONS
             weights = {by_angle[one]: weight for one, weight in planar_weights(angle).items()}
             for a in multiples(top):
-                rows.append(emulator.weighted_row([(weights, a)]))
-                natural.append((a * size * math.cos(angle), a * size * math.sin(angle)))
-                ends.append(a >= top)
-                owner.append(planar[0])
-                multiple.append(a)
+                natural = (a * size * math.cos(angle), a * size * math.sin(angle))
+                nodes.append((emulator.weighted_row([(weights, a)]), natural, a >= top, planar[0], a))
     else:
         for number, way in ways:
             top = _top(emulator, number)
             for a in multiples(top):
-                rows.append(emulator.row({number: a}))
-                natural.append(tuple(a * unit for unit in way.unit))
-                ends.append(a >= top)
-                owner.append(number)
-                multiple.append(a)
-    return _Nodes(np.array(rows), np.array(natural), np.array(ends), np.array(owner), np.array(multiple))
+                natural = tuple(a * unit for unit in way.unit)
+                nodes.append((emulator.row({number: a}), natural, a >= top, number, a))
+    return _Nodes(*(np.array(column) for column in zip(*nodes, strict=True)))
 
 
 def _top(emulator: Emulator, way: int) -> float:

@@ -118,7 +118,11 @@ def answer(found: Posterior, nothing_from: float = NOTHING_FROM) -> tuple[str, t
         text = f"Data as far off {listed([_spoken(one) for one in names])} come up in less than 1 of 100 cases."
         return UNEXPLAINED, (), text
     odds = ", ".join(f"{_spoken(one)} {_percent(everything[one])}" for one in rivals)
-    return f"ambiguous:{','.join(rivals)}", names, f"The data leave several answers: {odds}."
+    text = f"The data leave several answers: {odds}."
+    if shared := sorted(set.intersection(*(set(one.split("+")) for one in rivals))):
+        p = sum(p for label, p in found.effects.items() if set(shared) <= set(label.split("+")))
+        text += f" In all of them {_spoken('+'.join(shared))} is missing, alone or with something else ({_percent(p)})."
+    return f"ambiguous:{','.join(rivals)}", names, text
 
 
 def listed(names: Sequence[str]) -> str:
