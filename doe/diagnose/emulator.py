@@ -32,6 +32,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import block_diag
 
 from doe.analysis.covariance import pooled_slopes, residuals_within, shrunk_covariance
 from doe.errors import StatisticsError
@@ -410,14 +411,10 @@ def _squash(own: Lessons, condition: int) -> Squash:
 
 def _whitening(drawn_in: Sequence[FloatArray], own: Lessons, weights: Sequence[float] | None) -> tuple[FloatArray, int]:
     """W (D, D), block by condition, and the degrees of freedom."""
-    sizes, group = [block.shape[1] for block in drawn_in], own.groups()
-    white = np.zeros((sum(sizes), sum(sizes)))
-    first = 0
-    for c, (size, block) in enumerate(zip(sizes, drawn_in, strict=True)):
-        covariance = shrunk_covariance(residuals_within(block, group, own.theta))
-        inverse = np.linalg.inv(np.linalg.cholesky(covariance))
-        white[first : first + size, first : first + size] = inverse * np.sqrt(weights[c] if weights else 1.0)
-        first += size
+    group = own.groups()
+    covariances = [shrunk_covariance(residuals_within(block, group, own.theta)) for block in drawn_in]
+    white = block_diag(*(np.linalg.inv(np.linalg.cholesky(one)) for one in covariances))
+    if weights:
+        white *= np.sqrt(np.repeat(weights, [len(one) for one in covariances]))[:, None]
     several = np.bincount(group) > 1
-    pours = int(several[group].sum())
-    return white, max(1, pours - int(several.sum()) - own.theta.shape[1])
+    return white, max(1, int(several[group].sum()) - int(several.sum()) - own.theta.shape[1])
