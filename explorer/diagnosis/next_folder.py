@@ -32,7 +32,7 @@ from doe.table_file import read_table, read_text
 from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
 from explorer.files.run_folder import appearing
-from explorer.report.diagnosis.wording import spelled
+from explorer.report.diagnosis.wording import FOLLOW_UPS_SO_FAR, spelled
 from explorer.scene.text import toml_key, toml_value
 from explorer.units import code, enumeration, number, parameter_label, parameter_value, percent
 from solver import EFFECTS, Scene, Settings, checked, named, parameters, parse_quantity, pour_rig, read_toml, value
@@ -367,8 +367,9 @@ Pour **{pours} times**, each time onto the bare plate.{reading}
 ## What it will decide
 
 {pours} pours give the right answer with a chance of **{percent(experiment.chance)}**, by simulated pours of the
-likeliest of these. (An effect is named with {percent(THRESHOLD)} or more, nothing missing is the answer with
-{percent(NOTHING_FROM)} or more.)
+likeliest of these. {FOLLOW_UPS_SO_FAR}
+(An effect is named with {percent(THRESHOLD)} or more, nothing missing is the answer with {percent(NOTHING_FROM)} or
+more.)
 
 ## Why this one
 

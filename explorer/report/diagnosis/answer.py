@@ -12,6 +12,7 @@ from explorer.report.content import Banner, Block, Bullets, Caution, Facts, Figu
 from explorer.report.diagnosis.charts import likely, probability_chart
 from explorer.report.diagnosis.evidence import strained
 from explorer.report.diagnosis.wording import (
+    FOLLOW_UPS_SO_FAR,
     amplitudes_of,
     chance,
     feature_in,
@@ -316,8 +317,8 @@ def _asked_for(result: DiagnosisResult) -> str:
         return "No change of the rig that was tried would tell them apart."
     first = result.next_experiment[0]
     best, pours = first.experiment, first.pours
-    chance = percent(best.chance)
-    return f"{pours} pours of {code(best.name)} would single out the right one with a chance of {chance}."
+    text = f"{pours} pours of {code(best.name)} would single out the right one with a chance of {percent(best.chance)}."
+    return f"{text} {FOLLOW_UPS_SO_FAR}"
 
 
 def _facts(result: DiagnosisResult) -> list[tuple[str, str]]:

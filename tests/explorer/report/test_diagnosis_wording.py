@@ -7,12 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from doe.validation.sets import read_rows
 from explorer.diagnosis.run import DiagnoseOrder, result_of
 from explorer.report.diagnosis import wording
 from explorer.report.diagnosis.wording import (
     SURFACE_LABELS,
     feature_label,
 )
+from explorer.terminal.validation import TRUE
 from solver import ASYMMETRY_NAMES, BULK_NAMES, HISTOGRAM_NAMES, PROFILE_NAMES, TEXTURE_NAMES
 from tests.explorer.diagnosed import CASES, diagnosed, typed
 from tests.explorer.reported_diagnoses import (
@@ -31,6 +33,15 @@ pytestmark = pytest.mark.usefixtures("unprinted")
 def probability(result, name):
     """Of an effect, as sentences give it."""
     return f"{100 * next(row['probability'] for row in result['effects'] if row['name'] == name):.1f} %"
+
+
+def test_what_came_of_follow_ups_is_as_the_validation_found_it():
+    rows = [row for row in read_rows(Path("assets/validation/sets.jsonl")) if row.root == 2 and row.asked]
+    found = sum(row.answer == TRUE.get(row.kind, "right") for row in rows)
+    stated = sum(row.chance for row in rows) / len(rows)
+    assert f"{found} of {len(rows)} follow-ups found it, where {stated:.0%} had" in wording.FOLLOW_UPS_SO_FAR.replace(
+        " %", "%"
+    )
 
 
 def test_what_each_verdict_says(results):
@@ -54,6 +65,7 @@ def test_what_each_verdict_says(results):
     both = f"`twisting` ({odds['twisting']}) and `rolling_resistance` ({odds['rolling_resistance']})"
     assert says["ambiguous"].startswith(f"The declared model lacks something; these data leave 2 answers: {both}.")
     assert "6 pours of `half the mass` would single out the right one" in says["ambiguous"]
+    assert says["ambiguous"].endswith(wording.FOLLOW_UPS_SO_FAR)
     assert says["faint"].startswith("These data leave 4 answers: ")
     assert "nothing missing (" in says["faint"]
     assert "`adhesion_sjkr` (" in says["faint"]
