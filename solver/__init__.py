@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from solver.assets import AssetNotFoundError, asset_path, own_path
-from solver.effects import EFFECTS, SetUpEffect, Stage, Telltale
+from solver.effects import EFFECTS, SetUpEffect, Telltale
 from solver.machine import available_cores, memory_limits
 from solver.npz import NpzError, npz_arrays
 from solver.observables import OBSERVABLES, Value, observable_names, observables_in, observe
@@ -192,7 +192,6 @@ __all__ = [
     "SetUpEffect",
     "Settings",
     "Spheres",
-    "Stage",
     "Telltale",
     "TomlTable",
     "Trace",

@@ -18,15 +18,13 @@ from doe.errors import StatisticsError
 from doe.measurement.measurement import MeasuredParameter, Measurement
 from doe.measurement.summaries import summary_names
 from doe.record import Record
-from solver import EFFECTS, ParameterError, Scene, Stage, parameters, with_values
+from solver import EFFECTS, ParameterError, Scene, parameters, with_values
 
 FloatArray = npt.NDArray[np.float64]
 
 BOX = 3.0
 """Standard deviations about an independently measured mean within which a parameter is believed."""
 DRAWN_IN = 0.8
-ADHESIVE = {name for name, effect in EFFECTS.items() if getattr(effect, "stage", None) == Stage.ADHESION}
-"""Effects that pull surfaces together."""
 
 
 @dataclass(frozen=True)

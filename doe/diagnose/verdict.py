@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from doe.declared.model import ADHESIVE, CalibratedParameter, Declared
+from doe.declared.model import CalibratedParameter, Declared
 from doe.diagnose.compared_features import Compared
 from doe.diagnose.posterior import FITS, TEMPERATURE, Fit, Posterior
 from doe.diagnose.result import NO_EFFECT, UNEXPLAINED, EffectRow, ParameterRow, Place, Residual
@@ -118,14 +118,7 @@ def answer(found: Posterior, nothing_from: float = NOTHING_FROM) -> tuple[str, t
         text = f"Data as far off {listed([_spoken(one) for one in names])} come up in less than 1 of 100 cases."
         return UNEXPLAINED, (), text
     odds = ", ".join(f"{_spoken(one)} {_percent(everything[one])}" for one in rivals)
-    text = f"The data leave several answers: {odds}."
-    if shared := sorted(set.intersection(*(set(one.split("+")) for one in rivals))):
-        p = sum(p for label, p in found.effects.items() if set(shared) <= set(label.split("+")))
-        text += f" In all of them {_spoken('+'.join(shared))} is missing, alone or with something else ({_percent(p)})."
-    elif set("+".join(rivals).split("+")) <= ADHESIVE:
-        p = sum(p for label, p in found.effects.items() if set(label.split("+")) <= ADHESIVE)
-        text += f" All of them make surfaces stick, by different laws ({_percent(p)})."
-    return f"ambiguous:{','.join(rivals)}", names, text
+    return f"ambiguous:{','.join(rivals)}", names, f"The data leave several answers: {odds}."
 
 
 def listed(names: Sequence[str]) -> str:

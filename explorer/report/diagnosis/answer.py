@@ -27,7 +27,7 @@ from explorer.report.diagnosis.wording import (
     spelled,
 )
 from explorer.units import MISSING, code, counted, enumeration, fixed, p_value, percent, signed
-from solver.effects import EFFECTS
+from solver.effects import EFFECTS, Stage
 
 FAR = 2.0
 """Error over noise floor beyond which a model is called off: a true one keeps below 1.4 in 95 of 100 cases with eight
@@ -45,6 +45,8 @@ ones, both that were one of two effects, and the one for an outside effect (``do
 FAIR = 0.5
 """Chance of an answer below which a set-up is not likely to give one."""
 MOST_LEVERS = 6
+ADHESIONS = {name for name, effect in EFFECTS.items() if getattr(effect, "stage", None) == Stage.ADHESION}
+"""Effects that pull surfaces together."""
 
 
 # In short
@@ -155,9 +157,26 @@ def _verdict(result: DiagnosisResult) -> str:
                 if NO_EFFECT in answers(result.verdict)
                 else "The declared model lacks something; these data"
             )
-            return f"{opening} leave {len(left)} answers: {enumeration(left)}. {_asked_for(result)}"
+            told = [
+                f"{opening} leave {len(left)} answers: {enumeration(left)}.",
+                _in_common(result),
+                _asked_for(result),
+            ]
+            return " ".join(text for text in told if text)
         case "unexplained":
             return f"{_unexplained(result)} {_sits(result)}"
+
+
+def _in_common(result: DiagnosisResult) -> str:
+    """What is settled though several answers are left: an effect that all of them have, or that all are adhesions."""
+    left = [set(members(one)) for one in answers(result.verdict)]
+    if shared := sorted(set.intersection(*left)):
+        p = sum(row.probability for row in result.effects if set(shared) <= set(members(row.name)))
+        return f"In all of them {spelled('+'.join(shared))} is missing, alone or with something else ({chance(p)})."
+    if set.union(*left) <= ADHESIONS:
+        p = sum(row.probability for row in result.effects if set(members(row.name)) <= ADHESIONS)
+        return f"All of them are laws of adhesion: that surfaces stick is settled ({chance(p)}), by which law is not."
+    return ""
 
 
 def confirmation_sentence(result: DiagnosisResult) -> str:

@@ -69,16 +69,6 @@ def test_the_reason_is_told():
     assert "as far off a or b come up" in answer(posterior(0.01, 0.01, {"a": 0.6, "b": 0.38}, "ab"))[2]
 
 
-def test_what_all_answers_that_are_left_have_in_common_is_told():
-    kind, names, text = answer(posterior(0.01, 0.01, {"a": 0.5, "a+b": 0.3, "a+c": 0.16, "b": 0.02}))
-    assert (kind, names) == ("ambiguous:a,a+b,a+c", ("a", "a+b", "a+c"))
-    assert text.endswith("In all of them a is missing, alone or with something else (96 %).")
-    assert "of them" not in answer(posterior(0.01, 0.01, {"a": 0.5, "b+c": 0.48}))[2]
-    laws = {"adhesion_jkr": 0.5, "adhesion_sjkr+capillary_bridge": 0.3, "wall_adhesion": 0.16, "twisting": 0.02}
-    assert answer(posterior(0.01, 0.01, laws))[2].endswith("All of them make surfaces stick, by different laws (96 %).")
-    assert "of them" not in answer(posterior(0.01, 0.01, laws | {"wall_adhesion": 0.02, "twisting": 0.16}))[2]
-
-
 def test_the_tables_of_a_verdict_by_closed_form():
     """Unit noise, one slope and one effect, six pours of data: a parameter two deviations up, "lean" three too high."""
     rng = np.random.default_rng(0)

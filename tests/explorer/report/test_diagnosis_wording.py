@@ -144,6 +144,30 @@ def test_an_amplitude_that_is_cut_and_a_wide_scatter_are_called_so(results):
     assert "the largest that was considered" in verdict_sentence(result)
 
 
+@pytest.mark.parametrize(
+    ("left", "settled"),
+    [
+        (
+            {"twisting": 0.5, "twisting+adhesion_sjkr": 0.3, "air_drag+twisting": 0.16},
+            "In all of them `twisting` is missing, alone or with something else (96.0 %).",
+        ),
+        (
+            {"adhesion_jkr": 0.5, "adhesion_sjkr+capillary_bridge": 0.3, "wall_adhesion": 0.16},
+            "All of them are laws of adhesion: that surfaces stick is settled (96.0 %), by which law is not.",
+        ),
+        ({"twisting": 0.5, "air_drag+adhesion_sjkr": 0.46}, ""),
+        ({"adhesion_jkr": 0.5, "twisting": 0.46}, ""),
+    ],
+)
+def test_what_is_settled_though_several_answers_are_left_is_told(results, left, settled):
+    result = copy.deepcopy(results["ambiguous"])
+    row = result["effects"][0]
+    result["effects"] = [row | {"name": name, "probability": p} for name, p in {**left, "plate_tilt": 0.02}.items()]
+    result["verdict"] = f"ambiguous:{','.join(left)}"
+    text = verdict_sentence(result)
+    assert (settled in text) if settled else (" of them " not in text)
+
+
 def test_a_parameter_far_from_its_measurement_is_called_so(results):
     result = copy.deepcopy(results["effect"])
     assert strained(result) == []
