@@ -97,12 +97,13 @@ def run_queue(
     is in flight. Pours of different contact laws run in a batch each.
     """
     backend.init(threads=threads)
-    slots = worlds or WORLDS_PER_THREAD * (threads or available_cores())
+    cores = threads or available_cores()
+    slots = worlds or WORLDS_PER_THREAD * cores
     by_law = {law: [one for one in room if one.contact.law == law] for law in {one.contact.law: None for one in room}}
     batches = {law: Batch(capacity_for(scenes, slots)) for law, scenes in by_law.items()}
     running: dict[tuple[str, int], tuple[Job, Pour]] = {}
     # A thread works on a contiguous share of the worlds: fill the shares evenly.
-    places = sorted(range(slots), key=lambda w: (w % max(1, slots // (threads or available_cores())), w))
+    places = sorted(range(slots), key=lambda w: (w % max(1, slots // cores), w))
     while True:
         while queue and len(running) < slots:
             job = queue.popleft()

@@ -175,11 +175,11 @@ def warm_up(rooms: Sequence[Sequence[Scene]], workers: int | None = None) -> Ite
     alike: dict[tuple[Capacity, ...], list[int]] = {}
     for k, room in enumerate(needed):
         alike.setdefault(tuple(Rooms().make(room)), []).append(k)
-    waiting = deque(alike.items())
+    waiting, most = deque(alike.items()), workers or available_cores()
     busy: dict[Connection, tuple[list[int], BaseProcess, float]] = {}
     try:
         while waiting or busy:
-            while waiting and len(busy) < (workers or available_cores()):
+            while waiting and len(busy) < most:
                 sizes, numbers = waiting.popleft()
                 if not missing(sizes):
                     yield from ((k, None) for k in numbers)
