@@ -120,11 +120,13 @@ class ModelPours:
         has its own.
         """
         self._conditions, self._paths, self._store = tuple(conditions), tuple(paths), store
+        self._names = [(profile_names(one), feature_set(one)) for one in conditions]
+        """Of what is read off a pour, by condition."""
         self._places = [c if place is None else place for c in range(len(conditions))]
         self._pours, self._on_pour, self._root = pours, on_pour, root
         self._known: dict[Place, PointPour] = {}
         self._keys: dict[Place, str] = {}
-        """Of the pours that are asked for."""
+        """Of the pours that are asked for, looked at as they are."""
         self.run_now = 0
         """Pours that were really run, not found in the store."""
 
@@ -172,8 +174,10 @@ class ModelPours:
         for k in range(len(searches)):
             queue.extend(resumed(k))
         left = len(queue)
+        if not queue:
+            return [found[k] for k in range(len(searches))]
         room = room_of(self._conditions) + [job.scene for job in queue] + self._possible(widest, asked)
-        for job, record in self._pours(queue, room) if queue else ():
+        for job, record in self._pours(queue, room):
             k, (point, c) = wanted[job.tag]
             self._known[point, c] = self._keep(what, point, c, job, record)
             self.run_now += 1
@@ -192,7 +196,7 @@ class ModelPours:
 
     def records(self, points: Sequence[Point], condition: int) -> list[Record]:
         """What is kept of the pours of ``points`` that came to a valid end, which have been asked for before."""
-        stored = [self._store.find(self._keys[point, condition]) for point in points]
+        stored = [self._store.find(self._key(point, condition)) for point in points]
         return [unpacked(one.raw) for one in stored if one is not None and Outcome(one.outcome).valid]
 
     def scene(self, point: Point, condition: int) -> Scene:
@@ -222,21 +226,40 @@ class ModelPours:
         """Whether the pour is known, here or in the store."""
         place = point, condition
         if place not in self._known:
-            self._keys[place] = pour_key(self.scene(point, condition), self.seed(point, condition))
-            stored = self._store.find(self._keys[place])
+            stored = self._store.find(self._key(point, condition))
             if stored is not None:
                 asked = self._conditions[condition]
-                names = [name + point.view.label for name in (*profile_names(asked), *feature_set(asked).names)]
+                profile, features = self._names[condition]
+                names = [name + point.view.label for name in (*profile, *features.names)]
                 stored = self._store.read(stored, names, reader(asked, point.view))
-                self._known[place] = _pour(asked, stored, point.view)
+                self._known[place] = self._pour(condition, stored, point.view)
         return place in self._known
+
+    def _key(self, point: Point, condition: int) -> str:
+        """Key of the pour of ``point`` in a condition, however it is looked at."""
+        place = point.seen(AS_IT_IS), condition
+        if place not in self._keys:
+            self._keys[place] = pour_key(self.scene(point, condition), self.seed(point, condition))
+        return self._keys[place]
 
     def _keep(self, what: str, point: Point, condition: int, job: Job, record: Record) -> PointPour:
         asked = self._conditions[condition]
-        key, label = self._keys[point, condition], f"{point.sequence} {point.number}"
+        key, label = self._key(point, condition), f"{point.sequence} {point.number}"
         stored = stored_run(job, record, "diagnose", what, label, reader(asked, point.view), key)
         self._store.add(stored)
-        return _pour(asked, stored, point.view)
+        return self._pour(condition, stored, point.view)
+
+    def _pour(self, condition: int, stored: StoredRun, view: View) -> PointPour:
+        """What is kept of a stored pour; NaN for what could not be read."""
+        profile, features = self._names[condition]
+
+        def numbers(names: Sequence[str]) -> tuple[float, ...]:
+            found = (stored.observables[name + view.label] for name in names)
+            return tuple(math.nan if x is None else x for x in found)
+
+        return PointPour(
+            numbers(features.scalars), stored.outcome, numbers(profile), numbers(features.profile + features.surface)
+        )
 
 
 def measured_profile(condition: Condition) -> Observation | None:
@@ -268,19 +291,3 @@ def reader(condition: Condition, view: View = AS_IT_IS) -> Reader:
         return dict(zip(names, (*heights, *numbers.tolist()), strict=True))
 
     return read
-
-
-def _pour(condition: Condition, stored: StoredRun, view: View) -> PointPour:
-    """What is kept of a stored pour of ``condition``; NaN for what could not be read."""
-
-    def numbers(names: Sequence[str]) -> tuple[float, ...]:
-        found = (stored.observables[name + view.label] for name in names)
-        return tuple(math.nan if x is None else x for x in found)
-
-    features = feature_set(condition)
-    return PointPour(
-        numbers(features.scalars),
-        stored.outcome,
-        numbers(profile_names(condition)),
-        numbers(features.profile + features.surface),
-    )

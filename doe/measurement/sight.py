@@ -20,8 +20,8 @@ Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
 AZIMUTHS = tuple(math.radians(15.0 * k) for k in range(24))
-ELEVATIONS = tuple(math.radians(5.0 * k) for k in range(6, 18))
-"""Directions that are tried [rad]: from 30° to 85° above the plate."""
+ELEVATIONS = tuple(math.radians(5.0 * k) for k in range(17, 5, -1))
+"""Directions that are tried [rad]: from 85° to 30° above the plate."""
 COVERED = 0.25
 """Least share for a camera; holes at random are covered by a few per cent."""
 FEW = 0.003
@@ -57,17 +57,25 @@ def seen_through(surface: HeightMap, sight: Sight) -> HeightMap:
 
 def hidden(surface: HeightMap, sight: Sight) -> Bools:
     """Pixels from which the line to the camera meets something higher."""
-    height, found = surface.height, np.zeros(surface.height.shape, dtype=bool)
-    rise = math.tan(sight.elevation) * surface.pixel
-    farthest = int(float(height.max(initial=0.0)) / rise) + 1 if rise > 0.0 else 0
-    if sight.elevation >= 0.5 * math.pi or farthest < 1:
-        return found
-    padded = np.pad(height, farthest)
-    n, m = height.shape
-    for step in range(1, farthest + 1):
-        i = farthest + round(step * math.cos(sight.azimuth))
-        j = farthest + round(step * math.sin(sight.azimuth))
-        found |= padded[i : i + n, j : j + m] > height + step * rise
+    if not 0.0 < sight.elevation < 0.5 * math.pi:
+        return np.zeros(surface.height.shape, dtype=bool)
+    return _shadows(surface, sight.azimuth, (sight.elevation,))[0]
+
+
+def _shadows(surface: HeightMap, azimuth: float, elevations: Sequence[float]) -> list[Bools]:
+    """Hidden pixels by each of ``elevations``, from the highest down: the lower the camera, the farther the shadows."""
+    height, found, step = surface.height, [], 0
+    rises = [math.tan(elevation) * surface.pixel for elevation in elevations]
+    reach = [int(float(height.max(initial=0.0)) / rise) + 1 for rise in rises]
+    padded, (n, m) = np.pad(height, reach[-1]), height.shape
+    steepest = np.full(height.shape, -np.inf)
+    for rise, farthest in zip(rises, reach, strict=True):
+        while step < farthest:
+            step += 1
+            i = reach[-1] + round(step * math.cos(azimuth))
+            j = reach[-1] + round(step * math.sin(azimuth))
+            np.maximum(steepest, (padded[i : i + n, j : j + m] - height) / step, out=steepest)
+        found.append(steepest > rise)
     return found
 
 
@@ -87,12 +95,11 @@ def found_sight(scans: Sequence[HeightMap], noise: float) -> Sight:
     if holes <= FEW * sum(missing.size for _, missing in pairs):
         return Sight(noise=noise)
     best, most = Sight(noise=noise), COVERED
-    for elevation in ELEVATIONS:
-        for azimuth in AZIMUTHS:
-            sight = Sight(azimuth, elevation, noise)
-            shadows = [hidden(surface, sight) for surface, _ in pairs]
-            both = sum(int((shadow & missing).sum()) for shadow, (_, missing) in zip(shadows, pairs, strict=True))
-            union = sum(int((shadow | missing).sum()) for shadow, (_, missing) in zip(shadows, pairs, strict=True))
+    for azimuth in AZIMUTHS:
+        shadows = zip(*(_shadows(surface, azimuth, ELEVATIONS) for surface, _ in pairs), strict=True)
+        for elevation, seen in zip(ELEVATIONS, shadows, strict=True):
+            both = sum(int((shadow & missing).sum()) for shadow, (_, missing) in zip(seen, pairs, strict=True))
+            union = sum(int((shadow | missing).sum()) for shadow, (_, missing) in zip(seen, pairs, strict=True))
             if both > most * union:
-                best, most = sight, both / union
+                best, most = Sight(azimuth, elevation, noise), both / union
     return best

@@ -157,15 +157,19 @@ def parameters(scene: Scene) -> dict[str, Parameter]:
 
 def canonical(scene: Scene, path: str) -> str:
     """``path`` with the names of a pair in the order of the scene; raises if the path does not exist."""
+    return _parameter(scene, path).path
+
+
+def _parameter(scene: Scene, path: str) -> Parameter:
     known = parameters(scene)
     if path in known:
-        return path
+        return known[path]
     parts = path.split(".")
     if parts[0] == "pair" and len(parts) == 4:
         pair = scene.pair(parts[1], parts[2])
         swapped = f"pair.{pair.a}.{pair.b}.{parts[3]}"
         if swapped in known:
-            return swapped
+            return known[swapped]
     near = [name for name in known if name.split(".")[0] == parts[0]] or sorted({n.split(".")[0] for n in known})
     raise ParameterError(f"{path}: no such parameter; known: {', '.join(near)}")
 
@@ -186,9 +190,8 @@ def with_values(scene: Scene, values: dict[str, Any]) -> Scene:
     A mass fraction that is set scales the other fractions so that they add up to one.
     """
     for path, raw in values.items():
-        path = canonical(scene, path)
-        checked = parameters(scene)[path].check(raw)
-        scene = _with_value(scene, path.split("."), checked)
+        parameter = _parameter(scene, path)
+        scene = _with_value(scene, parameter.path.split("."), parameter.check(raw))
     check(scene)
     return scene
 
