@@ -135,7 +135,10 @@ def weighed(
     Raises StatisticsError where a condition has nothing that can be compared.
     """
     if instruments:
-        conditions = [_freed(one, instrument) for one, instrument in zip(conditions, instruments, strict=True)]
+        conditions = [
+            replace(one, values=one.values - instrument.bias[: one.values.shape[1]])
+            for one, instrument in zip(conditions, instruments, strict=True)
+        ]
     taught, columns = usable(lessons, [_there(condition) for condition in conditions])
     left_out = [
         f"{condition.condition}: {condition.names[k]}"
@@ -219,10 +222,6 @@ def _scatter(
             expected += (len(block) - 1) * d * slack
         first = last
     return max(1.0, square / expected) if expected > 0.0 else 1.0
-
-
-def _freed(condition: MeasuredFeatures, instrument: Instrument) -> MeasuredFeatures:
-    return replace(condition, values=condition.values - instrument.bias[: condition.values.shape[1]])
 
 
 def _loadings(

@@ -21,10 +21,10 @@ from doe.diagnose.confirm import (
     model_of,
     residual_maps,
 )
-from doe.diagnose.posterior import Posterior, gain_by_pours
+from doe.diagnose.posterior import Posterior, gain_by_pours, holds
 from doe.diagnose.result import NO_EFFECT, HeldOut, Level, Offered, Suggestion
 from doe.diagnose.training_pours import Say, TrainingPours
-from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD, Verdict, taken_back, verdict_of
+from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD, Verdict, candidate, taken_back, verdict_of
 from doe.errors import MeasurementError
 from doe.holdout import HoldoutCondition, HoldoutError, MeasuredReplicates, holdout_errors
 from doe.measurement.features import SCAN, feature_set
@@ -112,7 +112,7 @@ def run_diagnosis(
 
     model, everywhere = pours_in(measurement.fit), pours_in(measurement.conditions)
     training = TrainingPours(declared, measurement.fit, model, budget, say)
-    compared = pursued(training, measurement.fit, budget, say)
+    compared = pursued(training, measurement.fit, budget, say, follow_up is not None)
     verdict = verdict_of(compared, declared, training.pours, follow_up is not None)
     say(f"verdict: {verdict.kind}")
     confirmed, verdict = concluded(verdict, compared, declared, measurement.conditions, everywhere, say)
@@ -155,7 +155,9 @@ def joined(measurement: Measurement, follow_up: Measurement) -> Measurement:
     return replace(measurement, conditions=(*measurement.fit, *follow_up.fit, *measurement.holdout))
 
 
-def pursued(training: TrainingPours, conditions: Sequence[Condition], budget: Budget, say: Say) -> Compared:
+def pursued(
+    training: TrainingPours, conditions: Sequence[Condition], budget: Budget, say: Say, followed_up: bool
+) -> Compared:
     """Models and data once what is in question has been looked at more closely."""
     data = [measured(condition) for condition in conditions]
     instruments = training.instruments(data)
@@ -179,8 +181,8 @@ def pursued(training: TrainingPours, conditions: Sequence[Condition], budget: Bu
         looked |= set(poured)
         compared = weighed(training.lessons(), training.ways, data, instruments)
         say(f"after a closer look at {', '.join(poured)}: {odds(compared.posterior)}")
-    label, p = compared.posterior.best if compared.posterior.effects else ("", 0.0)
-    if p >= THRESHOLD:
+    label, sure = candidate(compared.posterior, followed_up)
+    if sure >= THRESHOLD:
         training.refine(compared.posterior, label)
         compared = weighed(training.lessons(), training.ways, data, instruments)
         say(f"with pours on both sides of its best fit: {odds(compared.posterior)}")
@@ -192,11 +194,11 @@ def pursued(training: TrainingPours, conditions: Sequence[Condition], budget: Bu
 def inseparable(compared: Compared, name: str) -> str:
     """An answer that no number of pours tells from the effect ``name`` and that keeps it from a name; "" for none.
 
-    A name takes ``THRESHOLD``, which it cannot get while another answer holds the rest by itself.
+    A name takes ``THRESHOLD``, which it cannot get while another answer without it holds the rest by itself.
     """
     found = compared.posterior
     everything = {**found.effects, "base": found.nothing}
-    rivals = [label for label, p in everything.items() if label != name and p > 1.0 - THRESHOLD]
+    rivals = [label for label, p in everything.items() if not holds(label, name) and p > 1.0 - THRESHOLD]
     for label in rivals:
         if gain_by_pours(found.fits[name], found.fits[label], compared.emulator, compared.data) < LITTLE:
             return "nothing missing" if label == "base" else label

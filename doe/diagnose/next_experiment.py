@@ -21,7 +21,7 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
-from doe.diagnose.posterior import TEMPERATURE
+from doe.diagnose.posterior import TEMPERATURE, holds
 from doe.diagnose.result import RankedExperiment
 from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD
 
@@ -94,9 +94,13 @@ def chance_of_an_answer(
             log_likelihood = -np.log(np.diag(factors[j])).sum() - 0.5 * (white**2).sum(axis=0)
             logs.append(np.log(prior[j]) + TEMPERATURE * log_likelihood)
         odds = np.exp(np.stack(logs) - logs[k])
-        wrong = (odds.sum(axis=0) - 1.0) * (1.0 - prior[k]) / (prior.sum() - prior[k])
+        without = np.array([not holds(other, name) for other in names])
+        right, wrong = odds[~without].sum(axis=0), odds[without].sum(axis=0)
+        if without.any():
+            wrong *= (1.0 - prior[~without].sum()) / prior[without].sum()
         enough = NOTHING_FROM if name == "base" else THRESHOLD
-        chance += float(prior[k]) * float((1.0 / (1.0 + wrong) >= enough).mean())
+        given = (right >= enough * (right + wrong)) & (odds.argmax(axis=0) == k)
+        chance += float(prior[k]) * float(given.mean())
     return chance
 
 

@@ -174,20 +174,29 @@ class Posterior:
         """The most probable effect, or pair, and its probability."""
         return max(self.effects.items(), key=lambda item: item[1])
 
+    def missing(self, label: str) -> float:
+        """Probability that all effects of ``label`` are missing, alone or with others."""
+        return sum(p for one, p in self.effects.items() if holds(one, label))
+
+
+def holds(one: str, other: str) -> bool:
+    """Whether the effect or pair ``one`` has all effects of ``other``."""
+    return set(other.split("+")) <= set(one.split("+"))
+
 
 @dataclass(frozen=True)
 class _Nodes:
     """Amplitudes over which the evidence of a model is summed, with the rows of the regression.
 
     ``natural``: (n, p) of all its effects in turn. ``ends``: where an amplitude is the largest. ``levels``: the way and
-    multiple that a node is, where it is of one way.
+    multiple that a node is, of one effect.
     """
 
     rows: FloatArray
     natural: FloatArray
     ends: npt.NDArray[np.bool_]
-    way: npt.NDArray[np.int64]
-    multiple: FloatArray
+    way: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    multiple: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def every(self, step: int) -> _Nodes:
         """Every ``step``-th node, beginning in the middle of the first ``step``."""
@@ -217,16 +226,13 @@ def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, 
     Probabilities, and the best fit of every model.
     """
     weigher = _Weigher(emulator, data)
-    base = weigher.row[None]
-    mean, variance = weigher.at(base)
+    base = weigher.base
+    mean, variance = weigher.at(base.rows)
     spread = weigher.log_t(np.repeat(mean, len(SPREADS), 0), variance + SPREADS[:, None] ** 2)
     singles = {name: _nodes_of(emulator, name) for name in dict.fromkeys(way.effect for way in emulator.ways)}
     logs = {name: weigher.densities(nodes.rows) for name, nodes in singles.items()}
-    fits = {"base": weigher.fit("base", (), base, np.zeros((1, 0)), np.zeros(1, bool), weigher.densities(base))}
-    fits |= {
-        name: weigher.fit(name, (name,), nodes.rows, nodes.natural, nodes.ends, logs[name])
-        for name, nodes in singles.items()
-    }
+    fits = {"base": weigher.fit("base", base, weigher.densities(base.rows))}
+    fits |= {name: weigher.fit(name, nodes, logs[name]) for name, nodes in singles.items()}
     number, priors = len(singles), priors_of(tuple(singles))
     weighed = {name: _weight(priors[name], fits[name].log_evidence, temperature) for name in singles}
     nothing = _weight(priors["base"], fits["base"].log_evidence, temperature)
@@ -261,15 +267,10 @@ def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, 
 def fitted(emulator: Emulator, data: Data, label: str) -> Fit:
     """The best fit of one model: "base", an effect, or "a+b"."""
     weigher = _Weigher(emulator, data)
-    if label == "base":
-        row = weigher.row[None]
-        return weigher.fit(label, (), row, np.zeros((1, 0)), np.zeros(1, bool), weigher.densities(row))
-    names = label.split("+")
-    singles = {name: _nodes_of(emulator, name) for name in names}
-    if len(names) == 2:
-        return _pairs(weigher, singles, least=0.0)[label]
-    nodes = singles[label]
-    return weigher.fit(label, names, nodes.rows, nodes.natural, nodes.ends, weigher.densities(nodes.rows))
+    if "+" in label:
+        return _pairs(weigher, {name: _nodes_of(emulator, name) for name in label.split("+")}, least=0.0)[label]
+    nodes = weigher.base if label == "base" else _nodes_of(emulator, label)
+    return weigher.fit(label, nodes, weigher.densities(nodes.rows))
 
 
 def gain_by_pours(one: Fit, other: Fit, emulator: Emulator, data: Data) -> float:
@@ -335,7 +336,6 @@ def multiples(top: float) -> FloatArray:
 
 def _pairs(weigher: _Weigher, singles: Mapping[str, _Nodes], least: float = SECOND) -> dict[str, Fit]:
     """Fits of every two effects acting at once, each shifting the data by ``least`` standard errors."""
-    base = weigher.row
     seen = {name: nodes.only(weigher.shifts(nodes.rows) >= least) for name, nodes in singles.items()}
     coarse = {name: nodes.every(COARSE) for name, nodes in seen.items() if len(nodes.rows)}
     found = {}
@@ -344,11 +344,10 @@ def _pairs(weigher: _Weigher, singles: Mapping[str, _Nodes], least: float = SECO
         i, j = (
             grid.reshape(-1) for grid in np.meshgrid(*(np.arange(len(n.rows)) for n in (one, other)), indexing="ij")
         )
-        rows = one.rows[i] + other.rows[j] - base
-        logs = weigher.densities(rows)
         natural = np.concatenate([one.natural[i], other.natural[j]], axis=1)
+        nodes = _Nodes(one.rows[i] + other.rows[j] - weigher.base.rows, natural, one.ends[i] | other.ends[j])
         label = f"{first}+{second}"
-        found[label] = weigher.fit(label, (first, second), rows, natural, one.ends[i] | other.ends[j], logs)
+        found[label] = weigher.fit(label, nodes, weigher.densities(nodes.rows))
     return found
 
 
@@ -357,7 +356,7 @@ class _Weigher:
 
     def __init__(self, emulator: Emulator, data: Data) -> None:
         self._emulator, self._data = emulator, data
-        self.row = emulator.row()
+        self.base = _Nodes(emulator.row()[None], np.zeros((1, 0)), np.zeros(1, bool))
         # Σ is known condition by condition, each by as many pours.
         self._freedom = emulator.freedom * len(emulator.squashes)
 
@@ -369,7 +368,7 @@ class _Weigher:
 
     def shifts(self, rows: FloatArray) -> FloatArray:
         """How far the data of ``rows`` are off those of the base model [standard errors], (n,)."""
-        means = self._emulator.at(np.concatenate([self.row[None], rows]))[0]
+        means = self._emulator.at(np.concatenate([self.base.rows, rows]))[0]
         return np.asarray(np.sqrt(self._data.replicates) * np.linalg.norm(means[1:] - means[0], axis=1))
 
     def bent(self, mean: FloatArray, variance: FloatArray) -> tuple[FloatArray, ...]:
@@ -396,27 +395,20 @@ class _Weigher:
         parts = [self.log_t(*self.at(rows[first : first + AT_ONCE])) for first in range(0, len(rows), AT_ONCE)]
         return np.concatenate(parts)
 
-    def fit(
-        self,
-        label: str,
-        effects: Sequence[str],
-        rows: FloatArray,
-        natural: FloatArray,
-        ends: npt.NDArray[np.bool_],
-        logs: FloatArray,
-    ) -> Fit:
+    def fit(self, label: str, nodes: _Nodes, logs: FloatArray) -> Fit:
         """The model at its best node, with what all nodes say of its amplitudes."""
         best = int(logs.argmax())
-        mean, noise = (one[0] for one in self.at(rows[best : best + 1]))
+        mean, noise = (one[0] for one in self.at(nodes.rows[best : best + 1]))
         theta, d, noise, z, slopes = (one[0] for one in self.bent(mean[None], noise[None]))
         covariance = np.linalg.inv(np.eye(len(theta)) + slopes.T @ (slopes / noise[:, None]))
         full = np.diag(noise) + slopes @ slopes.T + self._data.instrument @ self._data.instrument.T
         square = float(d @ np.linalg.solve(full, d)) / len(d)
         weights = np.exp(logs - logsumexp(logs))
         sizes = {way.effect: len(way.unit) for way in self._emulator.ways}
+        effects = [] if label == "base" else label.split("+")
         owners = [(effect, index) for effect in effects for index in range(sizes[effect])]
         amplitudes = tuple(
-            Amplitude(effect, index, *_spread_of(natural[:, column], weights), bool(ends[best]))
+            Amplitude(effect, index, *_spread_of(nodes.natural[:, column], weights), bool(nodes.ends[best]))
             for column, (effect, index) in enumerate(owners)
         )
         return Fit(
@@ -428,7 +420,7 @@ class _Weigher:
             z,
             noise,
             mean,
-            self._emulator.at(rows[best : best + 1])[1][0],
+            self._emulator.at(nodes.rows[best : best + 1])[1][0],
             float(logsumexp(logs)) - math.log(len(logs)),
             float(stats.f.sf(square, len(d), self._freedom)),
         )

@@ -57,6 +57,8 @@ class EffectRow(Record):
         Of its best fit's shift to the residual, after recalibration.
     pours
         That taught it, in every condition.
+    beside
+        Posterior of the pairs that an effect is one of.
     """
 
     name: str
@@ -69,6 +71,12 @@ class EffectRow(Record):
     fitted_strength: float
     cosine: float
     pours: int
+    beside: float = 0.0
+
+    @property
+    def missing(self) -> float:
+        """Probability that it is missing, alone or with others."""
+        return self.probability + self.beside
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,9 @@
 kind: ``no_missing_effect``, ``effect:<name>``, ``effects:<a>+<b>``, ``unexplained``, or ``ambiguous:<a>,<b>,…`` with
 all that is still possible, which may be ``no_missing_effect`` and ``unexplained`` among them.
 
-    something is named     if its probability is ``THRESHOLD`` at least, the data are likely under it (``FITS``), and
-                           not under the declared model at its best fit (``DOUBTED``)
+    something is named     if it is the most probable effect or pair, with a probability of ``THRESHOLD`` at least
+                           (after a follow-up, which could not tell what is beside it: alone or with others), and the
+                           data are likely under it (``FITS``), and not under the declared model (``DOUBTED``)
     no_missing_effect      if its probability is ``NOTHING_AT_ONCE`` at least, ``NOTHING_FROM`` after a follow-up
     unexplained            if something outside the library is the most probable, or no model that is left fits
     ambiguous              else: the smallest set that holds ``CREDIBLE``
@@ -88,17 +89,19 @@ class Verdict(Record):
     taken_back: str = ""
 
 
-def answer(found: Posterior, nothing_from: float = NOTHING_FROM) -> tuple[str, tuple[str, ...], str]:
+def answer(found: Posterior, followed_up: bool) -> tuple[str, tuple[str, ...], str]:
     """Kind, names and sentence for a posterior."""
-    name, p = found.best if found.effects else ("", 0.0)
-    if p >= THRESHOLD and found.fits["base"].p < DOUBTED:
-        if found.fits[name].p >= FITS:
-            kind = f"effects:{name}" if "+" in name else f"effect:{name}"
-            text = f"{_spoken(name)} explains what the declared model cannot, with probability {_percent(p)}."
-            return kind, (name,), text
+    (name, sure), doubted = candidate(found, followed_up), found.fits["base"].p < DOUBTED
+    p = found.effects.get(name, 0.0)
+    if doubted and sure >= THRESHOLD and found.fits[name].p >= FITS:
+        kind = f"effects:{name}" if "+" in name else f"effect:{name}"
+        beside = "" if p >= THRESHOLD else f", alone ({_percent(p)}) or with another effect"
+        text = f"{_spoken(name)} explains what the declared model cannot, with probability {_percent(sure)}{beside}."
+        return kind, (name,), text
+    if doubted and p >= THRESHOLD:
         text = f"{_spoken(name)} comes nearest, and data as far off it as these come up in less than 1 of 100 cases."
         return UNEXPLAINED, (), text
-    if found.nothing >= nothing_from:
+    if found.nothing >= (NOTHING_FROM if followed_up else NOTHING_AT_ONCE):
         if found.fits["base"].p >= FITS:
             text = f"The data ask for nothing that the declared model lacks (probability {_percent(found.nothing)})."
             return NO_EFFECT, (), text
@@ -111,7 +114,7 @@ def answer(found: Posterior, nothing_from: float = NOTHING_FROM) -> tuple[str, t
     order = sorted(everything, key=lambda one: -everything[one])
     last = int(np.searchsorted(np.cumsum([everything[one] for one in order]), CREDIBLE)) + 1
     rivals = order[:last]
-    if p >= THRESHOLD and NO_EFFECT not in rivals:
+    if sure >= THRESHOLD and not doubted and NO_EFFECT not in rivals:
         rivals.append(NO_EFFECT)
     names = tuple(one for one in rivals if one in found.effects)
     if names and all(found.fits["base" if one == NO_EFFECT else one].p < FITS for one in rivals if one != UNEXPLAINED):
@@ -119,6 +122,12 @@ def answer(found: Posterior, nothing_from: float = NOTHING_FROM) -> tuple[str, t
         return UNEXPLAINED, (), text
     odds = ", ".join(f"{_spoken(one)} {_percent(everything[one])}" for one in rivals)
     return f"ambiguous:{','.join(rivals)}", names, f"The data leave several answers: {odds}."
+
+
+def candidate(found: Posterior, followed_up: bool) -> tuple[str, float]:
+    """The most probable effect or pair, "" for none, and the probability by which it may be named."""
+    name, p = found.best if found.effects else ("", 0.0)
+    return name, found.missing(name) if followed_up else p
 
 
 def listed(names: Sequence[str]) -> str:
@@ -129,7 +138,7 @@ def listed(names: Sequence[str]) -> str:
 def verdict_of(compared: Compared, declared: Declared, pours: Sequence[int], followed_up: bool) -> Verdict:
     """The verdict with its tables. ``pours``: that taught each way; ``followed_up``: whether nothing can be asked."""
     found = compared.posterior
-    kind, names, statement = answer(found, NOTHING_FROM if followed_up else NOTHING_AT_ONCE)
+    kind, names, statement = answer(found, followed_up)
     final = names[0] if names else "base"
     before, after = found.fits["base"], found.fits[final]
     white = _Recalibrated(compared)
@@ -185,6 +194,7 @@ def _effect_row(compared: Compared, white: _Recalibrated, label: str, pours: Seq
     return EffectRow(
         name=label,
         probability=found.effects[label],
+        beside=found.missing(label) - found.effects[label],
         log_evidence=fit.log_evidence - found.fits["base"].log_evidence,
         amplitudes=fit.amplitudes,
         p=fit.p,
@@ -230,7 +240,8 @@ def _residuals(compared: Compared, before: Fit, after: Fit) -> tuple[Residual, .
         spread = noise + fit.slopes @ fit.theta_covariance @ fit.slopes.T
         sigma = np.sqrt(np.einsum("ij,jk,ik->i", inverse, spread, inverse, optimize=True))
         columns.append((emulator.features(fit.z), (squashed - inverse @ fit.z) / sigma))
-    labels = [(condition, name) for condition, names in _conditions(compared) for name in names]
+    conditions = zip(compared.conditions, compared.names, strict=True)
+    labels = [(condition, name) for condition, names in conditions for name in names]
     (one, z_one), (other, z_other) = columns
     return tuple(
         Residual(
@@ -243,19 +254,12 @@ def _residuals(compared: Compared, before: Fit, after: Fit) -> tuple[Residual, .
 def _places(compared: Compared) -> tuple[Place, ...]:
     """Shares by condition: of the residual of the features as they are, whitened within the condition."""
     rows = _residuals(compared, compared.posterior.fits["base"], compared.posterior.fits["base"])
-    totals = {condition: 0.0 for condition, _ in _conditions(compared)}
-    for row in rows:
-        totals[row.condition] += row.z_before**2
-    whole = sum(totals.values()) or 1.0
-    found = []
-    for condition, total in totals.items():
-        worst = max((row for row in rows if row.condition == condition), key=lambda row: abs(row.z_before))
-        found.append(Place(condition, total / whole, worst.feature, worst.z_before))
+    whole, found = sum(row.z_before**2 for row in rows) or 1.0, []
+    for condition in compared.conditions:
+        own = [row for row in rows if row.condition == condition]
+        worst = max(own, key=lambda row: abs(row.z_before))
+        found.append(Place(condition, sum(row.z_before**2 for row in own) / whole, worst.feature, worst.z_before))
     return tuple(sorted(found, key=lambda one: -one.share))
-
-
-def _conditions(compared: Compared) -> list[tuple[str, tuple[str, ...]]]:
-    return list(zip(compared.conditions, compared.names, strict=True))
 
 
 def _spoken(name: str) -> str:

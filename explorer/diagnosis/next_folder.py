@@ -368,8 +368,8 @@ Pour **{pours} times**, each time onto the bare plate.{reading}
 
 {pours} pours give the right answer with a chance of **{percent(experiment.chance)}**, by simulated pours of the
 likeliest of these. {FOLLOW_UPS_SO_FAR}
-(An effect is named with {percent(THRESHOLD)} or more, nothing missing is the answer with {percent(NOTHING_FROM)} or
-more.)
+(An effect is named with {percent(THRESHOLD)} or more, alone or with others; nothing missing is the answer with
+{percent(NOTHING_FROM)} or more.)
 
 ## Why this one
 

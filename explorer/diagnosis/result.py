@@ -276,6 +276,11 @@ class DiagnosisResult(Document):
         """Return that of one answer; 0 of an effect that is so improbable that it has no row."""
         return dict(self.ranked()).get(answer, 0.0)
 
+    def missing(self, label: str) -> float:
+        """Return the probability that an effect, or both of a pair, is missing, alone or with others."""
+        row = self.effect_row(label)
+        return row.missing if row is not None else 0.0
+
     def effect_row(self, label: str) -> EffectRow | None:
         """Return the row of an effect or a pair; None where it has none."""
         return next((row for row in self.effects if row.name == label), None)
@@ -286,9 +291,9 @@ class DiagnosisResult(Document):
         What was given here, as it was calibrated, and the most probable effect, also one of an answer that does not
         fit; empty where it is not as probable as a name has to be.
         """
-        best, p = self.ranked()[0]
+        best, _ = self.ranked()[0]
         row = self.effect_row(best)
-        if row is None or p < self.threshold:
+        if row is None or row.missing < self.threshold:
             return {}
         after = {one.name: one.after for one in self.parameters}
         found = {name: tuple(after[path] for path in effect_values(name, one)) for name, one in self.given.items()}

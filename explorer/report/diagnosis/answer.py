@@ -64,7 +64,7 @@ WORDS: dict[Kind, Word] = {
 def banner(result: DiagnosisResult) -> Banner:
     """The answer as a verdict."""
     found = enumeration([spelled(one).replace("`", "").replace("_", " ") for one in result.named])
-    of = f"{found}, {chance(result.probability(result.named[0]))}" if result.named else ""
+    of = f"{found}, {chance(result.missing(result.named[0]))}" if result.named else ""
     return Banner(WORDS[result.kind], of, verdict_sentence(result), _what_next(result))
 
 
@@ -108,8 +108,8 @@ def in_short(result: DiagnosisResult) -> Section:
             "probabilities",
             probability_chart(result),
             f"Posterior probability of each answer (n = {sum(row.features for row in result.offered)} features of "
-            f"{counted(fitted, 'measured pour')}); dashed: {percent(result.threshold)}, from which on an effect is "
-            "named.",
+            f"{counted(fitted, 'measured pour')}). Pale: with another effect, also counted in the pair's row; dashed: "
+            f"{percent(result.threshold)}, from which on the most probable effect is named.",
         ),
         _probability_table(result),
     ]
@@ -140,14 +140,15 @@ def _verdict(result: DiagnosisResult) -> str:
         case "effect":
             (name,) = result.named
             return (
-                f"The declared model lacks {code(name)}, with probability {_sure(result.probability(name))}. It "
-                f"agrees with the fitted data at {_amplitudes(result, name)}. {confirmation_sentence(result)}"
+                f"The declared model lacks {code(name)}, with probability {_sure(result.missing(name))}"
+                f"{_alone(result, name)}. It agrees with the fitted data at {_amplitudes(result, name)}. "
+                f"{confirmation_sentence(result)}"
             )
         case "effects":
             (pair,) = result.named
             return (
                 f"The declared model lacks two effects at once, {spelled(pair)}, with probability "
-                f"{_sure(result.probability(pair))}; no single effect comes near. They agree with the fitted data at "
+                f"{_sure(result.missing(pair))}; no single effect comes near. They agree with the fitted data at "
                 f"{_amplitudes(result, pair)}. {confirmation_sentence(result)}"
             )
         case "ambiguous":
@@ -165,6 +166,12 @@ def _verdict(result: DiagnosisResult) -> str:
             return " ".join(text for text in told if text)
         case "unexplained":
             return f"{_unexplained(result)} {_sits(result)}"
+
+
+def _alone(result: DiagnosisResult, name: str) -> str:
+    """Whether the data tell that a named effect is alone."""
+    p = result.probability(name)
+    return "" if p >= result.threshold else f", alone ({chance(p)}) or with another effect"
 
 
 def _in_common(result: DiagnosisResult) -> str:
@@ -400,15 +407,17 @@ def _probability_table(result: DiagnosisResult) -> Table:
     for answer, p in likely(result):
         row = result.effect_row(answer)
         if row is None:
-            rows.append((spelled(answer), chance(p), MISSING, MISSING))
+            rows.append((spelled(answer), chance(p), MISSING, MISSING, MISSING))
         else:
-            rows.append((spelled(answer), chance(p), amplitudes_of(row.amplitudes), ", ".join(_of_bounds(row))))
+            sizes, bounds = amplitudes_of(row.amplitudes), ", ".join(_of_bounds(row))
+            rows.append((spelled(answer), chance(p), chance(row.missing), sizes, bounds))
     rest = max(0.0, 1.0 - sum(p for _, p in likely(result)))
-    rows.append(("all other answers together", chance(rest), MISSING, MISSING))
+    rows.append(("all other answers together", chance(rest), MISSING, MISSING, MISSING))
     return Table(
-        ("answer", "probability", "amplitude", "of the literature's bound"),
+        ("answer", "probability", "alone or with others", "amplitude", "of the literature's bound"),
         tuple(rows),
-        f"An effect is named from {percent(result.threshold)} on.",
+        f"The most probable effect or pair is named from {percent(result.threshold)} on; after a "
+        "follow-up alone and with others together.",
     )
 
 

@@ -51,7 +51,7 @@ ROLES: dict[Role, str] = {"holdout": "held-out", "fit": "fitted"}
 
 def diagnosis_plots(result: DiagnosisResult) -> Plots:
     """Title → plot: probabilities of the answers, residuals before and after, errors, piles."""
-    caption = "Dashed: from here on an effect is named."
+    caption = "Pale: with another effect, also counted in the pair's row. Dashed: from here on an effect is named."
     plots: Plots = {"Probability of each answer": Plot(partial(probability_chart, result), caption, 0.8)}
     if result.residuals:
         caption = "Dashed: 95 % for one feature; solid: for all of them. The farthest off, where there are many."
@@ -74,25 +74,37 @@ def likely(result: DiagnosisResult) -> list[tuple[str, float]]:
 
 
 def probability_chart(result: DiagnosisResult) -> Spec:
-    """Probability of every answer that is worth a row, with the threshold for a name."""
+    """Probability of every answer that is worth a row, and of its effect beside another, with the threshold for a name.
+
+    An effect beside another one is in the row of the pair as well.
+    """
     rows = likely(result)[::-1]
     colours = {NO_EFFECT: TARGET, UNEXPLAINED: DUMMY}
-    trace: Json = {
-        "type": "bar",
-        "orientation": "h",
-        "x": [100.0 * p for _, p in rows],
-        "y": [label(spelled(answer).replace("`", "")) for answer, _ in rows],
-        "marker": {"color": [colours.get(answer, FACTOR) for answer, _ in rows]},
-        "hovertemplate": "%{y}<br>%{x:.2f} %<extra></extra>",
-    }
+    beside = [row.beside if (row := result.effect_row(answer)) is not None else 0.0 for answer, _ in rows]
+    traces: list[Json] = [
+        {
+            "type": "bar",
+            "name": words,
+            "orientation": "h",
+            "x": [100.0 * p for p in shares],
+            "y": [label(spelled(answer).replace("`", "")) for answer, _ in rows],
+            "marker": {"color": [colours.get(answer, FACTOR) for answer, _ in rows], "opacity": opacity},
+            "hovertemplate": f"%{{y}}<br>%{{x:.2f}} % {words}<extra></extra>",
+        }
+        for words, opacity, shares in (
+            ("", 1.0, [p for _, p in rows]),
+            ("with another effect", 0.3, beside),
+        )
+    ]
     layout: Json = {
         "xaxis": axis("probability [%]", range=[0, 100]),
         "yaxis": axis("", tickfont={"size": 12}),
         "bargap": 0.35,
+        "barmode": "stack",
         "showlegend": False,
         "shapes": [vertical_line(100.0 * result.threshold, DUMMY, dash="dash")],
     }
-    return chart([trace], layout, 110 + ROW_HEIGHT * len(rows))
+    return chart(traces, layout, 110 + ROW_HEIGHT * len(rows))
 
 
 def error_chart(result: DiagnosisResult, role: Role) -> Spec:

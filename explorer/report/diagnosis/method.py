@@ -100,8 +100,9 @@ def _methods(result: DiagnosisResult) -> str:
         f"({moved}) were integrated out over their independent measurements. Prior probabilities were "
         f"{rule['prior_nothing']} that nothing is missing, {rule['prior_outside']} for something outside the library "
         f"and {rule['prior_pairs']} for two effects at once, the rest shared alike by the single effects; evidence was "
-        f"raised to the power {number(result.temperature)}. An effect was named from a posterior probability of "
-        f"{number(result.threshold)} on{doubted}."
+        f"raised to the power {number(result.temperature)}. The most probable effect or pair was named from a "
+        f"posterior probability of {number(result.threshold)} on, after a follow-up alone and beside others together"
+        f"{doubted}."
     )
 
 
@@ -164,8 +165,9 @@ def how_reached(result: DiagnosisResult) -> Section:
         f"and from the priors: {rule['prior_nothing']} for nothing missing, {rule['prior_outside']} for something "
         f"outside the library, {rule['prior_pairs']} for pairs, the rest for single effects. The temperature is "
         f"{number(result.temperature)}; below 1 the answer is less sure than the evidence says.",
-        f"What reaches {percent(result.threshold)} is named if the data are likely under it (p ≥ {rule['fits']})"
-        f"{doubted}. "
+        f"The most probable effect or pair is named if it reaches {percent(result.threshold)} (after a follow-up, "
+        "which could not tell what is beside it: alone and with others together) and the data are likely under it "
+        f"(p ≥ {rule['fits']}){doubted}. "
         f"Else nothing is missing if that has {percent(result.rule.nothing_at_once)} or more "
         f"({percent(result.rule.nothing_from)} after a follow-up), unexplained if something outside is the most "
         "probable, and ambiguous otherwise: the smallest set of answers that holds "

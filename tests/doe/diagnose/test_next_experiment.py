@@ -96,3 +96,17 @@ def test_the_candidates_are_ranked_and_set_ups_that_say_nothing_come_last():
 )
 def test_the_fewest_pours_that_do_nearly_as_well_are_asked_for(gap, own, pours):
     assert fewest_pours([item(gap, own), item(0.0, name="same")], WEIGHTS)[0] == pours
+
+
+def test_an_effect_is_found_with_whatever_is_beside_it():
+    """ "a" and "a+b" predict the same, "c" something far off: "a", the more probable, is named for both."""
+    near, far, exact = np.zeros(1), np.full(1, 1e3), np.zeros((1, 1))
+    one = CandidateExperiment(
+        "x", {"a": Prediction(near, exact), "a+b": Prediction(near, exact), "c": Prediction(far, exact)}
+    )
+    assert chance_of_an_answer(one, {"a": 0.5, "a+b": 0.3, "c": 0.2}, 6) == pytest.approx(0.7)
+    # Where the pair is the more probable, neither is: no other answer has both.
+    assert chance_of_an_answer(one, {"a": 0.3, "a+b": 0.5, "c": 0.2}, 6) == pytest.approx(0.2)
+    # Alone, it is a certain answer.
+    both = CandidateExperiment("x", {"a": Prediction(near, exact), "a+b": Prediction(near, exact)})
+    assert chance_of_an_answer(both, {"a": 0.5, "a+b": 0.3}, 6) == pytest.approx(0.5)

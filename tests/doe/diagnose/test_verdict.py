@@ -30,7 +30,38 @@ def posterior(nothing, outside, effects, badly=(), base=DOUBTED / 2.0):
     ],
 )
 def test_the_rules(found, kind):
-    assert answer(found)[0] == kind
+    assert answer(found, followed_up=True)[0] == kind
+
+
+ALONE = {"a": 0.5, "a+b": 0.25, "a+c": 0.2}
+
+
+@pytest.mark.parametrize(
+    ("found", "kind", "at_once"),
+    [
+        (posterior(0.02, 0.01, ALONE), "effect:a", "ambiguous:a,a+b,a+c"),
+        # The pair is the more probable: a alone is no answer.
+        (posterior(0.02, 0.01, {"a": 0.1, "a+b": 0.6, "a+c": 0.27}), "ambiguous:a+b,a+c,a", "ambiguous:a+b,a+c,a"),
+        (posterior(0.02, 0.01, {"a": 0.5, "a+b": 0.2, "b+c": 0.27}), "ambiguous:a,b+c,a+b", "ambiguous:a,b+c,a+b"),
+        # Alone it does not fit, and the pairs do.
+        (posterior(0.02, 0.01, ALONE, "a"), "ambiguous:a,a+b,a+c", "ambiguous:a,a+b,a+c"),
+        (
+            posterior(0.02, 0.01, ALONE, base=1.01 * DOUBTED),
+            f"ambiguous:a,a+b,a+c,{NO_EFFECT}",
+            "ambiguous:a,a+b,a+c",
+        ),
+    ],
+)
+def test_after_a_follow_up_what_is_in_all_answers_is_named(found, kind, at_once):
+    assert answer(found, followed_up=True)[0] == kind
+    assert answer(found, followed_up=False)[0] == at_once
+
+
+def test_a_name_says_whether_it_is_alone():
+    assert answer(posterior(0.02, 0.01, ALONE), followed_up=True)[2] == (
+        "a explains what the declared model cannot, with probability 95 %, alone (50 %) or with another effect."
+    )
+    assert "alone" not in answer(posterior(0.02, 0.01, {"a": 0.92, "a+b": 0.05}), followed_up=True)[2]
 
 
 @pytest.mark.parametrize(
@@ -47,26 +78,29 @@ def test_the_rules(found, kind):
     ],
 )
 def test_a_model_that_does_not_fit_is_no_answer(found, kind):
-    assert answer(found)[0] == kind
+    assert answer(found, followed_up=True)[0] == kind
 
 
 @pytest.mark.parametrize(("nothing", "kind"), [(0.65, f"ambiguous:{NO_EFFECT},a,{UNEXPLAINED}"), (0.7, NO_EFFECT)])
 def test_what_is_half_sure_that_nothing_is_missing_asks_for_more(nothing, kind):
     found = posterior(nothing, 0.1, {"a": 0.9 - nothing})
-    assert answer(found, NOTHING_AT_ONCE)[0] == kind
-    assert answer(found, NOTHING_FROM)[0] == NO_EFFECT
+    assert NOTHING_FROM < 0.65 < NOTHING_AT_ONCE <= 0.7
+    assert answer(found, followed_up=False)[0] == kind
+    assert answer(found, followed_up=True)[0] == NO_EFFECT
 
 
 @pytest.mark.parametrize("effects", [{"a": 0.95, "b": 0.02}, {"a+b": 0.97}])
 def test_nothing_is_named_beside_a_declared_model_that_fits(effects):
     name = next(iter(effects))
     found = posterior(0.02, 0.01, effects, base=1.01 * DOUBTED)
-    assert answer(found)[:2] == (f"ambiguous:{name},{NO_EFFECT}", (name,))
-    assert answer(posterior(0.02, 0.01, effects, base=0.99 * DOUBTED))[1] == (name,)
+    assert answer(found, followed_up=True)[:2] == (f"ambiguous:{name},{NO_EFFECT}", (name,))
+    assert answer(posterior(0.02, 0.01, effects, base=0.99 * DOUBTED), followed_up=True)[1] == (name,)
 
 
 def test_the_reason_is_told():
-    assert "as far off a or b come up" in answer(posterior(0.01, 0.01, {"a": 0.6, "b": 0.38}, "ab"))[2]
+    assert (
+        "as far off a or b come up" in answer(posterior(0.01, 0.01, {"a": 0.6, "b": 0.38}, "ab"), followed_up=True)[2]
+    )
 
 
 def test_the_tables_of_a_verdict_by_closed_form():

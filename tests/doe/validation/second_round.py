@@ -63,8 +63,9 @@ class Asked:
 
         declared, budget = declare(measurement, tuple(EFFECTS)), self._answers.budget
         training = TrainingPours(declared, measurement.fit, pours_in(measurement.fit), budget, lambda line: None)
-        compared = pursued(training, measurement.fit, budget, lambda line: None)
-        verdict = verdict_of(compared, declared, training.pours, is_last and self._answers.follow_up)
+        followed_up = is_last and self._answers.follow_up
+        compared = pursued(training, measurement.fit, budget, lambda line: None, followed_up)
+        verdict = verdict_of(compared, declared, training.pours, followed_up)
         found = compared.posterior
         if is_last:
             return verdict, found, None
@@ -108,7 +109,7 @@ def second_round(answers, case, offer, say):
     row |= {"follow_up": answers.follow_up}
     row |= {"strength": case.strength if case.strength == case.strength else None, "physics": PHYSICS}
     row |= {"first": last, "best": best, "best_p": round(p, 4), "given": {}, "second": "", "last": ""}
-    if p >= THRESHOLD:
+    if found.missing(best) >= THRESHOLD:
         amplitudes = found.fits[best].amplitudes
         given = {name: tuple(one.value for one in amplitudes if one.effect == name) for name in best.split("+")}
         second, last, found, _ = asked.after_follow_up(measurement, given)

@@ -203,7 +203,7 @@ def test_the_data_say_what_they_offer_and_what_a_scan_would_add(result):
 def test_the_paragraph_for_a_paper_has_the_numbers_of_the_result(result):
     text = diagnosis_markdown(result).partition("## For a paper")[2].partition("## ")[0]
     assert f"on {result['pours']['settings']} simulated settings" in text
-    assert f"from a posterior probability of {result['threshold']}" in text
+    assert f"from a posterior probability of {result['threshold']} on" in text
     pours = "1 pour" if result["measured"][0]["replicates"] == 1 else "6 pours"
     for row in result["offered"]:
         assert f"{row['condition']} ({row['features']} features, {pours})" in text
@@ -221,9 +221,8 @@ def test_the_paragraph_for_a_paper_has_the_numbers_of_the_result(result):
 def test_the_method_states_its_rules(result):
     text = diagnosis_markdown(result).partition("## How the answer was reached")[2].partition("## ")[0]
     assert text.count("\n- ") == 6
-    assert (
-        "What reaches 90 % is named if the data are likely under it (p ≥ 0.01), and unlikely under the declared" in text
-    )
+    assert "effect or pair is named if it reaches 90 % (after a follow-up, which" in text
+    assert "the data are likely under it (p ≥ 0.01), and unlikely under the declared" in text
     assert "unless the calibrated declared model fitted (p ≥ 0.1)." in diagnosis_markdown(result)
     before = result | {"rule": {name: one for name, one in result["rule"].items() if name != "doubted"}}
     assert "the declared model (p <" not in diagnosis_markdown(before)

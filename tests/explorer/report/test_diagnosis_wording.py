@@ -76,6 +76,20 @@ def test_what_each_verdict_says(results):
     assert f"`adhesion_sjkr` comes nearest ({odds}), and yet does not fit" in says["does not fit"]
 
 
+def test_a_named_effect_that_may_not_be_alone_is_told_so(results):
+    result = copy.deepcopy(results["effect"])
+    (row,) = (one for one in result["effects"] if one["name"] == "adhesion_sjkr")
+    row |= {"probability": 0.6, "beside": 0.36}
+    assert verdict_sentence(result).startswith(
+        "The declared model lacks `adhesion_sjkr`, with probability 96.0 %, alone (60.0 %) or with another effect. It"
+    )
+    text = diagnosis_markdown(result)
+    assert "adhesion sjkr, 96.0 %" in text
+    assert "| 60.0 % | 96.0 % |" in text
+    before = result | {"effects": [{k: v for k, v in one.items() if k != "beside"} for one in result["effects"]]}
+    assert "with probability 60.0 %, alone (60.0 %)" in verdict_sentence(before)
+
+
 def test_a_declared_model_that_does_not_fit_and_has_no_rival_is_called_so(results):
     result = copy.deepcopy(results["nothing"]) | {"verdict": "unexplained"}
     assert verdict_sentence(result).startswith("The calibrated declared model does not fit the data, and no effect")
