@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from doe.declared.budget import Budget
 from doe.declared.model import Declared, declare
 from doe.declared.pours import ROOT, ModelPours, OnPour
-from doe.diagnose.budget import Budget
 from doe.diagnose.candidate_experiments import CandidateExperiments, next_experiment
 from doe.diagnose.compared_features import Compared, measured, weighed
 from doe.diagnose.confirm import (
@@ -43,6 +43,8 @@ FRESH = 8
 SETTLED, QUIET = 0.95, 0.8
 """Probability of an effect that has had a closer look, and of nothing, from which on no further look is taken; where
 the most probable effect has had one, ``NOTHING_FROM`` of nothing will do, for more pours add nothing to the data."""
+HELD = 2
+"""Closer looks in a row that leave an effect at ``THRESHOLD`` or more after which no further one is taken."""
 LITTLE = 0.1
 """Rise of a log evidence that changes nothing: by a tenth of the odds, before ``TEMPERATURE``."""
 FIRST_OTHER_ROOT = 100
@@ -164,11 +166,14 @@ def pursued(
     compared = weighed(training.lessons(), training.ways, data, instruments)
     say(f"after screening: {odds(compared.posterior)}")
     looked: set[str] = set()
+    held, before = 0, ""
     for _ in range(budget.looks):
         found = compared.posterior
         name, p = found.best if found.effects else ("", 0.0)
         quiet = NOTHING_FROM if name in looked else QUIET
-        settled = found.nothing >= quiet or (p >= SETTLED and name in looked)
+        held = (held if name == before else 0) + 1 if p >= THRESHOLD and name in looked else 0
+        before = name
+        settled = found.nothing >= quiet or (held > 0 and p >= SETTLED) or held >= HELD
         if not any(training.ways[way].effect == name for way, _ in training.at_end(found)):
             if settled:
                 break

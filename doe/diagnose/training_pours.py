@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
+from doe.declared.budget import Budget
 from doe.declared.model import Declared, effect_of, possible
 from doe.declared.points import (
     AS_IT_IS,
@@ -27,7 +28,6 @@ from doe.declared.points import (
     far_points,
 )
 from doe.declared.pours import ModelPours, PointPour, Search
-from doe.diagnose.budget import Budget
 from doe.diagnose.compared_features import Instrument, MeasuredFeatures
 from doe.diagnose.emulator import Lessons, Way
 from doe.diagnose.posterior import LEAST, Posterior

@@ -15,10 +15,10 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from doe.declared.budget import Budget
 from doe.declared.model import declare
 from doe.declared.points import Point
 from doe.declared.pours import ModelPours, room_of
-from doe.diagnose.budget import Budget
 from doe.diagnose.candidate_experiments import as_suggested
 from doe.diagnose.diagnosis import concluded, errors_of, joined, pursued, suggested
 from doe.diagnose.result import Suggestion

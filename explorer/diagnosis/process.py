@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
-from doe.diagnose.budget import scaled_budget
+from doe.declared.budget import scaled_budget
 from doe.measurement.load import load_measurement
 from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess, PourPlace
 from explorer.background.orders import BackgroundOrders, OrderedCommands

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from doe.declared.budget import Budget, scaled_budget
 from doe.declared.given import Given, with_given
 from doe.declared.model import effect_values
 from doe.declared.pours import measured_profile
-from doe.diagnose.budget import Budget, scaled_budget
 from doe.diagnose.confirm import CONTRADICTED, Confirmed
 from doe.diagnose.diagnosis import Diagnosis, joined, run_diagnosis
 from doe.diagnose.posterior import FITS, NOTHING, OUTSIDE, PAIRS

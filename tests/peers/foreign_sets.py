@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from doe.diagnose.budget import Budget
+from doe.declared.budget import Budget
 from doe.store import Store
 from doe.validation.campaign import Answers, CampaignOrder, measured_strengths
 from doe.validation.laboratory import TREFOILS, LaboratoryPour, read_laboratory

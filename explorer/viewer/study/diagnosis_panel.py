@@ -8,7 +8,7 @@ from pathlib import Path
 
 import viser
 
-from doe.diagnose.budget import Budget
+from doe.declared.budget import Budget
 from doe.record import RecordError
 from explorer.background.command_process import CommandStatus
 from explorer.background.output_folder import ResultFile

@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from doe.diagnose.budget import Budget
+from doe.declared.budget import Budget
 from doe.diagnose.confirm import confirming
 from doe.diagnose.diagnosis import complete_rows, fresh_pours
 from doe.diagnose.result import CalibratedModel

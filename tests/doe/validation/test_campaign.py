@@ -10,8 +10,8 @@ from contextlib import closing
 import numpy as np
 import pytest
 
+from doe.declared.budget import Budget
 from doe.declared.model import Declared, declare
-from doe.diagnose.budget import Budget
 from doe.measurement import load_measurement
 from doe.store import Store
 from doe.validation.campaign import Answers, CampaignOrder, run_campaign

@@ -8,7 +8,7 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from doe.diagnose.budget import Budget
+from doe.declared.budget import Budget
 from doe.errors import MeasurementError
 from doe.measurement import load_measurement
 from doe.measurement.condition_table import in_rig

@@ -5,7 +5,7 @@ When it last ran stands in ``docs/nightly.md``; whole runs with all fifteen effe
 
 import pytest
 
-from doe.diagnose.budget import Budget
+from doe.declared.budget import Budget
 from doe.diagnose.diagnosis import run_diagnosis
 from doe.measurement.load import load_measurement
 from doe.store import Store

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from doe.diagnose.budget import Budget
+from doe.declared.budget import Budget
 from doe.diagnose.diagnosis import run_diagnosis
 from doe.laboratory import analyse
 from doe.measurement import load_measurement, summaries_of_data
