@@ -15,8 +15,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import block_diag
 
 from doe.analysis.covariance import shrunk_means
+from doe.declared.bodies import BodyEvidence
 from doe.declared.points import AS_IT_IS
 from doe.declared.pours import ModelPours
 from doe.diagnose.compared_features import usable
@@ -84,7 +86,12 @@ class CandidateExperiments:
 
 
 def next_experiment(
-    training: TrainingPours, found: Posterior, weights: Mapping[str, float], condition: Condition, pours_in: PoursIn
+    training: TrainingPours,
+    found: Posterior,
+    weights: Mapping[str, float],
+    condition: Condition,
+    pours_in: PoursIn,
+    bodies: BodyEvidence | None = None,
 ) -> CandidateExperiments:
     """The candidates for telling answers apart, the most discriminating set-up first.
 
@@ -98,6 +105,8 @@ def next_experiment(
         The fitted condition that is changed.
     pours_in
         The pours of the declared model in set-ups.
+    bodies
+        What is to be measured of single bodies beside any of them, with the standard errors that are expected.
     """
     if len(weights) < 2:
         return CandidateExperiments((), 0)
@@ -122,9 +131,13 @@ def next_experiment(
         return CandidateExperiments((), model.run_now)
     asked = dict.fromkeys(name for label in weights if label != "base" for name in label.split("+"))
     levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in asked)
+    if bodies is not None:
+        items = [_with_bodies(one, found, bodies) for one in items]
+    asked_of = () if bodies is None else tuple((row.body, row.quantity) for row in bodies.rows)
     planned, ranked = fewest_pours(items, weights)
     suggestions = [
-        Suggestion(one, changes[one.name], condition.name, tuple(weights), levers, planned, turned) for one in ranked
+        Suggestion(one, changes[one.name], condition.name, tuple(weights), levers, planned, turned, asked_of)
+        for one in ranked
     ]
     return CandidateExperiments(tuple(suggestions), model.run_now)
 
@@ -166,6 +179,16 @@ def _item(
         covariance = unsure + slope @ found.fits[label].theta_covariance @ slope.T + beside.T @ beside
         predictions[label] = Prediction(mean, covariance + shared @ shared.T)
     return CandidateExperiment(set_up.name, predictions)
+
+
+def _with_bodies(item: CandidateExperiment, found: Posterior, bodies: BodyEvidence) -> CandidateExperiment:
+    """``item`` with the numbers of single bodies among what is predicted; a pour's noise on top is a little much."""
+    predictions = {}
+    for label, one in item.predictions.items():
+        best = [(a.effect, a.value, (a.high - a.low) / INTERVAL) for a in found.fits[label].amplitudes]
+        mean, covariance = bodies.predicted(best)
+        predictions[label] = Prediction(np.append(one.mean, mean), block_diag(one.covariance, covariance))
+    return replace(item, predictions=predictions)
 
 
 def _rows(emulator: Emulator, training: TrainingPours, found: Posterior, label: str) -> FloatArray:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from doe.declared.bodies import BodyEvidence
 from doe.diagnose.emulator import Emulator, Lessons, Way, emulated
 from doe.diagnose.posterior import Data, Posterior, fitted, posterior
 from doe.errors import StatisticsError
@@ -129,8 +130,10 @@ def weighed(
     ways: Sequence[Way],
     conditions: Sequence[MeasuredFeatures],
     instruments: Sequence[Instrument] = (),
+    bodies: BodyEvidence | None = None,
 ) -> Compared:
-    """Weigh all models by the data of the fitted ``conditions``, freed from the bias of their ``instruments``.
+    """Weigh all models by the data of the fitted ``conditions``, freed from the bias of their ``instruments``, and by
+    what was measured of single bodies.
 
     Raises StatisticsError where a condition has nothing that can be compared.
     """
@@ -157,6 +160,7 @@ def weighed(
         float(numbers.mean()),
         _scatter(emulator, blocks, weights, conditions),
         _loadings(emulator, blocks, conditions, columns, instruments),
+        bodies,
     )
     names = tuple(tuple(one.names[k] for k in chosen) for one, chosen in zip(conditions, columns, strict=True))
     labels = tuple(one.condition for one in conditions)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from doe.declared.bodies import body_evidence, wanted_bodies
 from doe.declared.budget import Budget
 from doe.declared.model import Declared, declare
 from doe.declared.pours import ROOT, ModelPours, OnPour
@@ -27,6 +28,7 @@ from doe.diagnose.training_pours import Say, TrainingPours
 from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD, Verdict, candidate, taken_back, verdict_of
 from doe.errors import MeasurementError
 from doe.holdout import HoldoutCondition, HoldoutError, MeasuredReplicates, holdout_errors
+from doe.measurement.bodies import MeasuredBody
 from doe.measurement.features import SCAN, feature_set
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.residual_map import ResidualMap
@@ -76,6 +78,7 @@ class Diagnosis:
     pours: int
     """Pours that were really run; the others were found in the store."""
     settings: int
+    bodies: tuple[MeasuredBody, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -114,16 +117,17 @@ def run_diagnosis(
 
     model, everywhere = pours_in(measurement.fit), pours_in(measurement.conditions)
     training = TrainingPours(declared, measurement.fit, model, budget, say)
-    compared = pursued(training, measurement.fit, budget, say, follow_up is not None)
+    compared = pursued(training, measurement, budget, say, follow_up is not None)
     verdict = verdict_of(compared, declared, training.pours, follow_up is not None)
     say(f"verdict: {verdict.kind}")
     confirmed, verdict = concluded(verdict, compared, declared, measurement.conditions, everywhere, say)
     candidates = CandidateExperiments((), 0)
     if follow_up is None and plan_next:
-        candidates = suggested(verdict, compared.posterior, training, measurement.fit, pours_in)
+        candidates = suggested(verdict, compared.posterior, training, measurement, pours_in)
     return Diagnosis(
         declared=declared,
         conditions=measurement.conditions,
+        bodies=measurement.bodies,
         levels=training.levels,
         offered=tuple(offered(condition, c, compared) for c, condition in enumerate(measurement.fit)),
         verdict=verdict,
@@ -154,16 +158,16 @@ def joined(measurement: Measurement, follow_up: Measurement) -> Measurement:
             raise MeasurementError(
                 f"{follow_up.folder}: condition {condition.name!r} is already in {measurement.folder}"
             )
-    return replace(measurement, conditions=(*measurement.fit, *follow_up.fit, *measurement.holdout))
+    conditions = (*measurement.fit, *follow_up.fit, *measurement.holdout)
+    return replace(measurement, conditions=conditions, bodies=(*measurement.bodies, *follow_up.bodies))
 
 
-def pursued(
-    training: TrainingPours, conditions: Sequence[Condition], budget: Budget, say: Say, followed_up: bool
-) -> Compared:
+def pursued(training: TrainingPours, measurement: Measurement, budget: Budget, say: Say, followed_up: bool) -> Compared:
     """Models and data once what is in question has been looked at more closely."""
-    data = [measured(condition) for condition in conditions]
+    data = [measured(condition) for condition in measurement.fit]
+    bodies = body_evidence(measurement, training.declared)
     instruments = training.instruments(data)
-    compared = weighed(training.lessons(), training.ways, data, instruments)
+    compared = weighed(training.lessons(), training.ways, data, instruments, bodies)
     say(f"after screening: {odds(compared.posterior)}")
     looked: set[str] = set()
     held, before = 0, ""
@@ -184,12 +188,12 @@ def pursued(
         if not poured:
             break
         looked |= set(poured)
-        compared = weighed(training.lessons(), training.ways, data, instruments)
+        compared = weighed(training.lessons(), training.ways, data, instruments, bodies)
         say(f"after a closer look at {', '.join(poured)}: {odds(compared.posterior)}")
     label, sure = candidate(compared.posterior, followed_up)
     if sure >= THRESHOLD:
         training.refine(compared.posterior, label)
-        compared = weighed(training.lessons(), training.ways, data, instruments)
+        compared = weighed(training.lessons(), training.ways, data, instruments, bodies)
         say(f"with pours on both sides of its best fit: {odds(compared.posterior)}")
         label = compared.posterior.best[0]
         return compared.refitted(("base", label))
@@ -246,16 +250,17 @@ def odds(found: Posterior) -> str:
 
 
 def suggested(
-    verdict: Verdict, found: Posterior, training: TrainingPours, conditions: Sequence[Condition], pours_in: PoursAt
+    verdict: Verdict, found: Posterior, training: TrainingPours, measurement: Measurement, pours_in: PoursAt
 ) -> CandidateExperiments:
-    """What to measure next: the first of the fitted ``conditions`` changed; nothing unless the verdict is ambiguous."""
+    """What to measure next: the first of the fitted conditions changed, and bodies; nothing unless it is ambiguous."""
     if not verdict.kind.startswith("ambiguous"):
         return CandidateExperiments((), 0)
     weights = {label: found.effects[label] for label in verdict.names[:MOST_RIVALS]}
     if NO_EFFECT in verdict.kind or len(weights) < 2:
         weights["base"] = found.nothing
+    bodies, place = wanted_bodies(measurement, training.declared, verdict.names), len(measurement.fit)
     candidates = next_experiment(
-        training, found, weights, conditions[0], lambda set_ups: pours_in(set_ups, len(conditions))
+        training, found, weights, measurement.fit[0], lambda set_ups: pours_in(set_ups, place), bodies
     )
     # It is chosen for the likeliest answers, and told of all that are left.
     left = (*verdict.names, *(label for label in weights if label == "base"))

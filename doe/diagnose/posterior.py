@@ -33,6 +33,7 @@ from scipy import stats
 from scipy.special import logsumexp
 
 from doe.analysis.covariance import log_t
+from doe.declared.bodies import BodyEvidence
 from doe.diagnose.emulator import ANGLES, Emulator, planar_weights
 from doe.diagnose.result import Amplitude
 
@@ -86,12 +87,15 @@ class Data:
         r, variance of the replicates over that of simulated pours, 1 at least.
     instrument
         I, (D, q), without columns where nothing is stated.
+    bodies
+        What was measured of single bodies.
     """
 
     z: FloatArray
     replicates: float
     scatter: float = 1.0
     instrument: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    bodies: BodyEvidence | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "instrument", self.instrument.reshape(len(self.z), -1))
@@ -189,7 +193,7 @@ class _Nodes:
     """Amplitudes over which the evidence of a model is summed, with the rows of the regression.
 
     ``natural``: (n, p) of all its effects in turn. ``ends``: where an amplitude is the largest. ``levels``: the way and
-    multiple that a node is, of one effect.
+    multiple that a node is, of one effect. ``step``: factor from one amplitude to the next.
     """
 
     rows: FloatArray
@@ -197,6 +201,7 @@ class _Nodes:
     ends: npt.NDArray[np.bool_]
     way: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     multiple: FloatArray = field(default_factory=lambda: np.zeros(0))
+    step: float = STEP
 
     def every(self, step: int) -> _Nodes:
         """Every ``step``-th node, beginning in the middle of the first ``step``."""
@@ -230,13 +235,14 @@ def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, 
     mean, variance = weigher.at(base.rows)
     spread = weigher.log_t(np.repeat(mean, len(SPREADS), 0), variance + SPREADS[:, None] ** 2)
     singles = {name: _nodes_of(emulator, name) for name in dict.fromkeys(way.effect for way in emulator.ways)}
-    logs = {name: weigher.densities(nodes.rows) for name, nodes in singles.items()}
-    fits = {"base": weigher.fit("base", base, weigher.densities(base.rows))}
+    logs = {name: weigher.densities(name, nodes) for name, nodes in singles.items()}
+    fits = {"base": weigher.fit("base", base, weigher.densities("base", base))}
     fits |= {name: weigher.fit(name, nodes, logs[name]) for name, nodes in singles.items()}
     number, priors = len(singles), priors_of(tuple(singles))
     weighed = {name: _weight(priors[name], fits[name].log_evidence, temperature) for name in singles}
     nothing = _weight(priors["base"], fits["base"].log_evidence, temperature)
-    log_outside = float(logsumexp(spread)) - math.log(len(SPREADS))
+    # Single bodies are as declared where something outside acts on a pour.
+    log_outside = float(logsumexp(spread) + weigher.of_bodies("base", base)[0]) - math.log(len(SPREADS))
     outside = _weight(priors["outside"], log_outside, temperature)
     if (
         pairs
@@ -270,7 +276,7 @@ def fitted(emulator: Emulator, data: Data, label: str) -> Fit:
     if "+" in label:
         return _pairs(weigher, {name: _nodes_of(emulator, name) for name in label.split("+")}, least=0.0)[label]
     nodes = weigher.base if label == "base" else _nodes_of(emulator, label)
-    return weigher.fit(label, nodes, weigher.densities(nodes.rows))
+    return weigher.fit(label, nodes, weigher.densities(label, nodes))
 
 
 def gain_by_pours(one: Fit, other: Fit, emulator: Emulator, data: Data) -> float:
@@ -320,7 +326,8 @@ def _nodes_of(emulator: Emulator, effect: str) -> _Nodes:
             for a in multiples(top):
                 natural = tuple(a * unit for unit in way.unit)
                 nodes.append((emulator.row({number: a}), natural, a >= top, number, a))
-    return _Nodes(*(np.array(column) for column in zip(*nodes, strict=True)))
+    rows, amplitudes, ends, numbers, sizes = (np.array(column) for column in zip(*nodes, strict=True))
+    return _Nodes(rows, amplitudes, ends, numbers, sizes)
 
 
 def _top(emulator: Emulator, way: int) -> float:
@@ -345,9 +352,9 @@ def _pairs(weigher: _Weigher, singles: Mapping[str, _Nodes], least: float = SECO
             grid.reshape(-1) for grid in np.meshgrid(*(np.arange(len(n.rows)) for n in (one, other)), indexing="ij")
         )
         natural = np.concatenate([one.natural[i], other.natural[j]], axis=1)
-        nodes = _Nodes(one.rows[i] + other.rows[j] - weigher.base.rows, natural, one.ends[i] | other.ends[j])
-        label = f"{first}+{second}"
-        found[label] = weigher.fit(label, nodes, weigher.densities(nodes.rows))
+        rows, ends = one.rows[i] + other.rows[j] - weigher.base.rows, one.ends[i] | other.ends[j]
+        nodes, label = _Nodes(rows, natural, ends, step=STEP**COARSE), f"{first}+{second}"
+        found[label] = weigher.fit(label, nodes, weigher.densities(label, nodes))
     return found
 
 
@@ -390,10 +397,16 @@ class _Weigher:
         instrument = np.broadcast_to(self._data.instrument, (*left.shape, self._data.instrument.shape[1]))
         return log_t(left, variance, np.concatenate([slopes, instrument], axis=2), self._freedom)
 
-    def densities(self, rows: FloatArray) -> FloatArray:
-        """Log densities (n,) of the data under ``rows``."""
-        parts = [self.log_t(*self.at(rows[first : first + AT_ONCE])) for first in range(0, len(rows), AT_ONCE)]
-        return np.concatenate(parts)
+    def densities(self, label: str, nodes: _Nodes) -> FloatArray:
+        """Log densities (n,) of the data under ``nodes``."""
+        starts, rows = range(0, len(nodes.rows), AT_ONCE), nodes.rows
+        parts = [self.log_t(*self.at(rows[first : first + AT_ONCE])) for first in starts]
+        return np.concatenate(parts) + self.of_bodies(label, nodes)
+
+    def of_bodies(self, label: str, nodes: _Nodes) -> FloatArray:
+        """Log densities (n,) of what was measured of single bodies, but for a constant."""
+        bodies = self._data.bodies
+        return np.zeros(len(nodes.rows)) if bodies is None else bodies.log_density(label, nodes.natural, nodes.step)
 
     def fit(self, label: str, nodes: _Nodes, logs: FloatArray) -> Fit:
         """The model at its best node, with what all nodes say of its amplitudes."""
@@ -402,7 +415,10 @@ class _Weigher:
         theta, d, noise, z, slopes = (one[0] for one in self.bent(mean[None], noise[None]))
         covariance = np.linalg.inv(np.eye(len(theta)) + slopes.T @ (slopes / noise[:, None]))
         full = np.diag(noise) + slopes @ slopes.T + self._data.instrument @ self._data.instrument.T
-        square = float(d @ np.linalg.solve(full, d)) / len(d)
+        square, numbers = float(d @ np.linalg.solve(full, d)), len(d)
+        if self._data.bodies is not None:
+            square -= 2.0 * float(self.of_bodies(label, nodes)[best])
+            numbers += len(self._data.bodies.off)
         weights = np.exp(logs - logsumexp(logs))
         sizes = {way.effect: len(way.unit) for way in self._emulator.ways}
         effects = [] if label == "base" else label.split("+")
@@ -422,7 +438,7 @@ class _Weigher:
             mean,
             self._emulator.at(nodes.rows[best : best + 1])[1][0],
             float(logsumexp(logs)) - math.log(len(logs)),
-            float(stats.f.sf(square, len(d), self._freedom)),
+            float(stats.f.sf(square / numbers, numbers, self._freedom)),
         )
 
 

@@ -194,6 +194,8 @@ class Suggestion(Record):
         That it asks for.
     turned
         Whether the rig is turned by 180° on its bench.
+    bodies
+        Component and quantity of what is to be measured of single bodies beside it (``doe/measurement/bodies.py``).
     """
 
     experiment: RankedExperiment
@@ -203,3 +205,4 @@ class Suggestion(Record):
     levers: tuple[str, ...]
     pours: int
     turned: bool = False
+    bodies: tuple[tuple[str, str], ...] = ()

@@ -87,7 +87,7 @@ class TrainingPours:
     def __init__(
         self, declared: Declared, conditions: Sequence[Condition], pours: ModelPours, budget: Budget, say: Say
     ) -> None:
-        self._declared, self._conditions = declared, tuple(conditions)
+        self.declared, self._conditions = declared, tuple(conditions)
         self._pours, self._budget, self._say = pours, budget, say
         self._acting: dict[Point, tuple[int, float]] = {}
         """Way and multiple of every point that was poured."""
@@ -136,7 +136,7 @@ class TrainingPours:
     @property
     def calibrated(self) -> frozenset[str]:
         """Paths of the calibrated parameters."""
-        return frozenset(one.name for one in self._declared.parameters)
+        return frozenset(one.name for one in self.declared.parameters)
 
     @property
     def settings(self) -> int:
@@ -169,10 +169,10 @@ class TrainingPours:
         ]
         if wanted:
             number = sum(point.sequence == BASE for point, (way, _) in self._acting.items() if way == -1)
-            points = base_points(self._declared, number + self._budget.more)
+            points = base_points(self.declared, number + self._budget.more)
             for j, theta in enumerate(found.fits["base"].theta):
                 if abs(theta) > LIMIT:
-                    points += far_points(self._declared, j, math.copysign(FAR, theta), self._budget.more)
+                    points += far_points(self.declared, j, math.copysign(FAR, theta), self._budget.more)
             self._pour("closer look", wanted, points)
         return tuple(dict.fromkeys(self.ways[way].effect for way, _, _ in wanted))
 
@@ -199,13 +199,13 @@ class TrainingPours:
         if all(one.sight == PERFECT and one.axis_error == 0.0 for one in conditions):
             return []
         return [
-            _instrument(self._declared, self._pours, c, one.scalars, one.axis_error, one.sight)
+            _instrument(self.declared, self._pours, c, one.scalars, one.axis_error, one.sight)
             for c, one in enumerate(conditions)
         ]
 
     def axis_in(self, pours: ModelPours, c: int, scalars: int, error: float) -> FloatArray:
         """What a scan's axis that is ``error`` [m] off along x and y does in condition ``c`` of ``pours``, (2, d)."""
-        return _instrument(self._declared, pours, c, scalars, error).axis
+        return _instrument(self.declared, pours, c, scalars, error).axis
 
     def probes(self, found: Posterior, labels: Sequence[str], number: int) -> list[Probe]:
         """``number`` pours of each effect of ``labels``, as they teach it, near its best fit in ``found``."""
@@ -225,12 +225,12 @@ class TrainingPours:
     def possible_in(self, scene: Scene) -> bool:
         """Whether ``scene`` can be set up with every effect at both ends of its range."""
         return all(
-            possible(scene, effect.name, end) for effect in self._declared.effects for end in (effect.low, effect.high)
+            possible(scene, effect.name, end) for effect in self.declared.effects for end in (effect.low, effect.high)
         )
 
     def base(self, number: int) -> list[Probe]:
         """``number`` pours of the base model, as they teach it."""
-        return [Probe(point, -1, 0.0) for point in base_points(self._declared, number)]
+        return [Probe(point, -1, 0.0) for point in base_points(self.declared, number)]
 
     def told(self, probes: Sequence[Probe], rows: Sequence[Sequence[PointPour]]) -> Lessons:
         """What pours of ``probes``, one per condition each, teach; NaN where one broke off or could not be read."""
@@ -240,7 +240,7 @@ class TrainingPours:
             block[[not pour.valid for pour in pours]] = np.nan
             blocks.append(block)
         return Lessons(
-            np.array([self._declared.theta(probe.point.theta) for probe in probes]).reshape(len(probes), -1),
+            np.array([self.declared.theta(probe.point.theta) for probe in probes]).reshape(len(probes), -1),
             np.array([probe.way for probe in probes], dtype=np.int64),
             np.array([probe.multiple for probe in probes], dtype=np.float64),
             np.array([probe.point.view == AS_IT_IS for probe in probes]),
@@ -257,14 +257,14 @@ class TrainingPours:
             return points
 
         def search(one: Direction) -> Search[Level]:
-            level = yield from level_of(self._declared, one, self._base, partial(tried, one), TRIALS)
+            level = yield from level_of(self.declared, one, self._base, partial(tried, one), TRIALS)
             # What screening will ask for, while others are still searched.
             yield self._points(one, level.share, self._budget.screening)
             return level
 
         searches = [search(one) for one in asked]
         widest = [point for one in asked for point in self._points(one, 1.0, 1)]
-        first = range(len(self._declared.conditions))
+        first = range(len(self.declared.conditions))
         found = self._pours.answered("amplitudes", searches, first, widest)
         levels, last = [], iter(found)
         for one in self._directions:
@@ -275,7 +275,7 @@ class TrainingPours:
 
     def _tell_shifts(self) -> None:
         """The shifts of the levels in the scalars, by all pours so far."""
-        first = len(self._declared.conditions)
+        first = len(self.declared.conditions)
         scalars = [np.arange(len(summary_names(condition))) for condition in self._conditions[:first]]
         lessons = self.lessons()
         shifts = taught_shifts(replace(lessons, blocks=lessons.blocks[:first]).only(scalars), self.ways)
@@ -286,7 +286,7 @@ class TrainingPours:
 
         ``refused``: by way the least share at which pours broke off.
         """
-        first = len(self._declared.conditions)
+        first = len(self.declared.conditions)
         asked: dict[int, tuple[float, list[Point]]] = {}
         for way, (direction, level) in enumerate(zip(self._directions, self._levels, strict=True)):
             if direction.angle or level.shift >= TRIALS.enough or level.share == 1.0:
@@ -320,12 +320,12 @@ class TrainingPours:
         """Pours of ``direction`` at ``share`` of its range, by whatever stands in for them."""
         if direction.angle is not None and direction.effect == "funnel_offset" and self._heaps:
             dx, dy = direction.at(share)
-            return [one.seen(View(shift=(dx, dy))) for one in base_points(self._declared, max(number, SHIFTED))]
+            return [one.seen(View(shift=(dx, dy))) for one in base_points(self.declared, max(number, SHIFTED))]
         if direction.angle and self._turned:
             first = next(one for one in self._directions if one.effect == direction.effect)
             turns = View(turns=round(direction.angle / (0.5 * math.pi)))
-            return [one.seen(turns) for one in effect_points(self._declared, first, share, number)]
-        return effect_points(self._declared, direction, share, number)
+            return [one.seen(turns) for one in effect_points(self.declared, first, share, number)]
+        return effect_points(self.declared, direction, share, number)
 
     def _pour(self, what: str, wanted: Iterable[tuple[int, float, int]], base: Sequence[Point] = ()) -> None:
         """Pour ways at multiples of their levels up to so many of each, of a planar effect in all its directions.

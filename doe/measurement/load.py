@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from doe.errors import MeasurementError, StudyFileError
+from doe.measurement.bodies import MeasuredBody, read_bodies
 from doe.measurement.condition_table import ConditionTable, condition_scene, in_rig
 from doe.measurement.measurement import Condition, CrossCheck, MeasuredParameter, Measurement
 from doe.measurement.observations import read_observations
@@ -55,6 +56,8 @@ class MeasurementFile(TomlTable):
     """Parameters that calibration may change."""
     uncertainty: dict[str, Annotated[float | str, Scalar()]] = Field(default_factory=dict)
     """Observable → standard deviation of one reading, where replicates cannot give it."""
+    bodies: str | None = None
+    """File beside this one, what was measured of single bodies (``doe/measurement/bodies.py``)."""
     condition: list[Annotated[Settings, Like(ConditionTable)]] = Field(default_factory=list)
 
 
@@ -92,6 +95,8 @@ def outside_files(folder: Path, table: Mapping[str, Any]) -> Iterator[tuple[str,
 
 def _named_files(folder: Path, table: Mapping[str, Any]) -> Iterator[tuple[str, Path]]:
     """Every file but the shipped ones that is read beside ``measurement.toml``, and what leads there."""
+    if isinstance(bodies := table.get("bodies"), str):
+        yield "bodies", folder / bodies
     conditions = table.get("condition")
     tables = [entry for entry in (conditions if isinstance(conditions, list) else []) if isinstance(entry, dict)]
     yield from (("material", file) for file in _of_material(folder, table.get("material")))
@@ -164,6 +169,8 @@ def _read(folder: Path, table: Settings, outside: Sequence[str]) -> Measurement:
         checks += crossed
         ignored += unused
         ignored += [f"condition {name}: images: {line}" for line in unread]
+    bodies = () if file.bodies is None else read_bodies(folder / own_path(file.bodies), base)
+    _of_one_material(bodies, conditions)
     suited = tuple(narrowed(parameter, [condition.scene for condition in conditions]) for parameter in measured)
     return Measurement(
         folder=folder,
@@ -174,7 +181,17 @@ def _read(folder: Path, table: Settings, outside: Sequence[str]) -> Measurement:
         ignored=tuple(ignored),
         notes=(*outside, *notes, *_narrowed(measured, suited), *_assumed(base, measured)),
         cross_check=tuple(checks),
+        bodies=bodies,
     )
+
+
+def _of_one_material(bodies: Sequence[MeasuredBody], conditions: Sequence[Condition]) -> None:
+    """Raise where a fitted condition has other bodies, those of a material of its own."""
+    scenes = [condition.scene for condition in conditions if condition.role == "fit"]
+    for row in bodies:
+        kinds = {next((one for one in scene.bodies if one.name == row.body), None) for scene in scenes}
+        if len(kinds) > 1:
+            raise MeasurementError(f"bodies: {row.body}: differs between the fitted conditions; allowed: one material")
 
 
 def _condition_entries(tables: Sequence[Settings]) -> list[ConditionTable]:

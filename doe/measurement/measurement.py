@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from doe.measurement.bodies import MeasuredBody
 from doe.measurement.scans import UpperSurface
 from doe.record import Record
 from solver import Scene
@@ -97,6 +98,8 @@ class Measurement:
     notes: tuple[str, ...] = ()
     """What was changed in reading, such as a range that was clipped."""
     cross_check: tuple[CrossCheck, ...] = ()
+    bodies: tuple[MeasuredBody, ...] = ()
+    """What was measured of single bodies."""
 
     @property
     def fit(self) -> tuple[Condition, ...]:

@@ -27,7 +27,7 @@ from doe.diagnose.verdict import verdict_of
 from doe.measurement import Condition, Measurement, load_measurement
 from doe.measurement.features import SCALARS, SCAN, feature_set
 from doe.store import Store, default_store
-from doe.validation.laboratory import TREFOILS, Laboratory, LaboratoryPour, read_laboratory
+from doe.validation.laboratory import TREFOILS, Laboratory, LaboratoryPour, read_laboratory, table_of_bodies
 from doe.validation.limit import limit_study
 from doe.validation.outside import possible_outside
 from doe.validation.reference import ROOT as REFERENCE_ROOT
@@ -212,13 +212,13 @@ class Answers:
             measurement = joined(measurement, follow_up)
         fitted, held = self.model_pours(measurement.fit), self.model_pours(measurement.holdout)
         training = TrainingPours(declared, measurement.fit, fitted, self.budget, say)
-        compared = pursued(training, measurement.fit, self.budget, say, follow_up is not None)
+        compared = pursued(training, measurement, self.budget, say, follow_up is not None)
         verdict = verdict_of(compared, declared, training.pours, follow_up is not None)
         conclusion, verdict = concluded(verdict, compared, declared, measurement.holdout, held, say)
         found = compared.posterior
         suggestion = None
         if self.follow_up and follow_up is None:
-            candidates = suggested(verdict, found, training, measurement.fit, self.model_pours)
+            candidates = suggested(verdict, found, training, measurement, self.model_pours)
             suggestion = next(iter(candidates.suggestions), None)
         best, best_p = found.best
         label = label_of(truth)
@@ -268,9 +268,14 @@ class Answers:
         data = self.measured(truth, [changed], f" {occasion} {asked.experiment.name}", asked.pours)
         if data is None:
             return None
+        bodies = ""
+        if asked.bodies:
+            (order, *_) = self.orders(truth, changed, range(1))
+            rng = np.random.default_rng([ROOT, *truth.case.seed, 3])
+            bodies = table_of_bodies(order.scene, asked.bodies, rng)
         with TemporaryDirectory() as folder:
             # The table of a changed condition reads like that of the condition itself; only its set-up is another one.
-            self.laboratory.hand_out(Path(folder), data, scanner, (ROOT, *truth.case.seed, 2))
+            self.laboratory.hand_out(Path(folder), data, scanner, (ROOT, *truth.case.seed, 2), bodies)
             measurement = load_measurement(Path(folder))
         (read,) = measurement.fit
         return replace(measurement, conditions=(as_suggested(read, asked),))

@@ -2,12 +2,12 @@
 
 Its file is written as ``measurement.toml`` (``doe/measurement/load.py``), without data, and with one table more,
 ``[laboratory]`` (:class:`LaboratoryTable`). Beside the table of numbers it hands out scans of its piles, made by a
-scanner of its own.
+scanner of its own, and in a follow-up what its balance and caliper tell of single bodies.
 """
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -21,12 +21,31 @@ import tomlkit
 from doe.errors import MeasurementError
 from doe.measurement import Measurement, load_measurement
 from doe.validation.scanner import Scanner, ScannerRanges, write_scan
-from solver import Names, Settings, TomlTable, all_names, asset_path, checked, naming_file, one_of, read_toml
+from solver import (
+    Body,
+    Names,
+    Scene,
+    Settings,
+    TomlTable,
+    actual,
+    all_names,
+    asset_path,
+    checked,
+    naming_file,
+    one_of,
+    read_toml,
+)
 
 Array = npt.NDArray[np.float64]
 
 TREFOILS = Path(__file__).parent / "laboratories/trefoils/laboratory.toml"
 """The shipped one."""
+LOTS, IN_LOT, MEASURED = 5, 10, 30
+"""Fifty bodies are weighed in five lots of ten, thirty are measured along their longest dimension."""
+BALANCE, CALIPER = 0.003, 0.005
+"""Standard deviation of the error of all weighings together, and of all lengths, relative."""
+BY_HAND = 0.01
+"""Standard deviation of a single length that a caliper is read to, relative."""
 
 
 class LaboratoryTable(TomlTable):
@@ -92,16 +111,26 @@ class Laboratory:
                 text = str(error).replace(str(Path(folder) / "measurement.toml"), str(self.path))
                 raise MeasurementError(text) from None
 
-    def write(self, folder: Path, measured: Mapping[str, Sequence[Reading]], scan: Settings | None = None) -> None:
+    def write(
+        self,
+        folder: Path,
+        measured: Mapping[str, Sequence[Reading]],
+        scan: Settings | None = None,
+        bodies: str = "",
+    ) -> None:
         """Write a data set into an existing ``folder``.
 
         ``measured``: condition → readings of its pours. ``scan``: what stands in every condition of its scans.
+        ``bodies``: the table of single bodies.
         """
         conditions: list[dict[str, Any]] = []
         for entry in self.table.get("condition", []):
             if (name := str(entry.get("name"))) in measured:
                 conditions.append({**entry, "data": f"{name}.csv"} | ({"scan": scan} if scan else {}))
         table = {**self.table, "material": str(self._material()), "condition": conditions}
+        if bodies:
+            table = {"bodies": "bodies.csv", **table}
+            (folder / "bodies.csv").write_text(bodies, encoding="utf-8")
         (folder / "measurement.toml").write_text(tomlkit.dumps(table), encoding="utf-8")
         for name, readings in measured.items():
             lines = ["replicate,observable,x,value"]
@@ -115,10 +144,14 @@ class Laboratory:
         measured: Mapping[str, Sequence[LaboratoryPour]],
         scanner: Scanner | None,
         seed: Sequence[int],
+        bodies: str = "",
     ) -> None:
-        """Write a data set of pours into an existing ``folder``, with scans where there is a ``scanner``."""
+        """Write a data set of pours into an existing ``folder``, with scans where there is a ``scanner``.
+
+        ``bodies``: the table of what was measured of single bodies.
+        """
         readings = {name: [sample.reading for sample in samples] for name, samples in measured.items()}
-        self.write(folder, readings, scanner.table() if scanner else None)
+        self.write(folder, readings, scanner.table() if scanner else None, bodies)
         if scanner is None:
             return
         (folder / "scans").mkdir()
@@ -167,3 +200,45 @@ def _check_ranges(ranges: ScannerRanges) -> None:
             raise MeasurementError(
                 f"laboratory.scanner.{key}: {list(values)}; allowed: lengths {allowed} in ascending order"
             )
+
+
+def table_of_bodies(scene: Scene, asked: Iterable[tuple[str, str]], rng: np.random.Generator) -> str:
+    """The table of what is ``asked``, component and quantity, of the bodies that ``scene`` pours, effects in it.
+
+    Means, and standard errors from the scatter of lots or bodies and what the instrument itself may be off.
+    """
+    bodies = {body.name: body for body in actual(scene).bodies}
+    lines = ["body,quantity,unit,mean,standard_error"]
+    wanted = list(asked)
+    for name in dict.fromkeys(body for body, _ in wanted):
+        found = {"mass": _weighed(bodies[name], rng), **_lengths(bodies[name], rng)}
+        for body, quantity in wanted:
+            if body == name:
+                unit, mean, error = found[quantity]
+                lines.append(f"{body},{quantity},{unit},{mean!r},{error!r}")
+    return "\n".join(lines) + "\n"
+
+
+def _scales(body: Body, number: int, rng: np.random.Generator) -> Array:
+    """Linear sizes of ``number`` bodies over the declared one."""
+    return np.asarray(body.sizes.quantile(rng.uniform(size=number)), dtype=np.float64)
+
+
+def _weighed(body: Body, rng: np.random.Generator) -> tuple[str, float, float]:
+    lots = body.mass * (_scales(body, LOTS * IN_LOT, rng) ** 3).reshape(LOTS, IN_LOT).mean(axis=1)
+    lots *= 1.0 + BALANCE * rng.standard_normal()
+    mean = float(lots.mean())
+    return "kg", mean, math.hypot(float(lots.std(ddof=1)) / math.sqrt(LOTS), BALANCE * mean)
+
+
+def _lengths(body: Body, rng: np.random.Generator) -> dict[str, tuple[str, float, float]]:
+    lengths = max(body.extents) * _scales(body, MEASURED, rng) * (1.0 + BY_HAND * rng.standard_normal(MEASURED))
+    lengths *= 1.0 + CALIPER * rng.standard_normal()
+    mean, deviation = float(lengths.mean()), float(lengths.std(ddof=1))
+    spread = math.sqrt(max(0.0, (deviation / mean) ** 2 - BY_HAND**2))
+    # Of a small spread the square is known, not the root: what the hand adds may hide it.
+    square = (deviation / mean) ** 2 * math.sqrt(2.0 / (MEASURED - 1))
+    return {
+        "length": ("m", mean, math.hypot(deviation / math.sqrt(MEASURED), CALIPER * mean)),
+        "length_spread": ("1", spread, square / max(2.0 * spread, math.sqrt(square))),
+    }

@@ -1,6 +1,7 @@
 """What to measure next, as a folder that a laboratory fills in: ``OUT/next`` of an ambiguous diagnosis, and back.
 
 measurement.toml, <name>.csv, scans/    a measured data set (`doe.measurement`) of one condition, without its values
+bodies.csv                              what to measure of single bodies, where that tells the answers apart
 README.md, setup.svg                    what to set otherwise, in words and to scale
 follow_up.json                          which answers the pours are to tell apart
 """
@@ -22,6 +23,8 @@ from xml.sax.saxutils import escape
 from doe.diagnose.result import BASE, Suggestion
 from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD
 from doe.errors import MeasurementError
+from doe.measurement.bodies import COLUMNS as BODY_COLUMNS
+from doe.measurement.bodies import QUANTITIES
 from doe.measurement.condition_table import AS_THEY_ARE, FEED_SLACK
 from doe.measurement.load import FILE, MeasurementFile, load_measurement
 from doe.measurement.long_form import COLUMNS, MOST_BYTES
@@ -39,7 +42,7 @@ from solver import EFFECTS, Scene, Settings, checked, named, parameters, parse_q
 from solver.assets import own_path
 from solver.rigs.surface import Revolved, SurfacePose
 
-ORDER, SCHEMA = "follow_up.json", 1
+ORDER, SCHEMA, BODIES = "follow_up.json", 1, "bodies.csv"
 DROPPED = ("images", "mean_of", "material")
 """Keys of a condition that are about pours that were made; its own material is that of the whole follow-up."""
 PROTOCOLS = {
@@ -100,6 +103,9 @@ def write_next(
         material = copied_material(str(stated.get("material", table["material"])), source, made)
         top = {"format": 1, "title": title, "material": material}
         tables = {"parameters": _parameters(table, measurement), "uncertainty": _uncertainty(table, condition)}
+        if suggestion.bodies:
+            top["bodies"] = BODIES
+            write_whole(made / BODIES, _empty_bodies(suggestion.bodies))
         write_whole(made / FILE, measurement_toml(top, tables, entry))
         write_whole(made / f"{name}.csv", _empty_table(condition, suggestion.pours))
         if scanned:
@@ -136,7 +142,7 @@ def read_next(folder: Path) -> NextFolder:
         return NextFolder(rivals, change, load_measurement(folder))
     except MeasurementError:
         for table in sorted(folder.glob("*.csv")):
-            if not _holds_value(table):
+            if table.name != BODIES and not _holds_value(table):
                 raise CommandError(
                     f"{table}: value: none is filled in yet; remove the # from a row and enter the measured value"
                 ) from None
@@ -179,7 +185,7 @@ def _holds_value(table: Path) -> bool:
 def _free_name(suggestion: Suggestion, measurement: Measurement, others: Sequence[str]) -> str:
     """The change as a file's name, and no condition's: a diagnosis takes the new data beside the old ones."""
     slug = re.sub(r"[^a-z0-9]+", "_", suggestion.experiment.name.lower()).strip("_") or "follow_up"
-    taken = {*others, *(condition.name for condition in measurement.conditions)}
+    taken = {Path(BODIES).stem, *others, *(condition.name for condition in measurement.conditions)}
     return next(one for k in range(1, len(taken) + 2) if (one := slug if k == 1 else f"{slug}_{k}") not in taken)
 
 
@@ -322,6 +328,17 @@ def _empty_table(condition: Condition, pours: int) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _empty_bodies(asked: Sequence[tuple[str, str]]) -> str:
+    """A row per component and quantity, each a comment until it has its numbers."""
+    lines = [
+        '# Not measured yet. Of each row that you measured, take off the "# " in front and write mean and',
+        "# standard error at its end. What was not measured stays as it is.",
+        ",".join(BODY_COLUMNS),
+    ]
+    lines += [f"# {body},{quantity},{QUANTITIES[quantity].written},," for body, quantity in asked]
+    return "\n".join(lines) + "\n"
+
+
 # For people
 
 
@@ -352,6 +369,17 @@ def _readme(
     command += [] if given is None else ["--given", str(given.absolute())]
     # The folder of the first diagnosis is not empty any more.
     command += ["--out", f"{folder.absolute().parent}_with_follow_up"]
+    weighed = ""
+    if suggestion.bodies:
+        kinds = [f"- {body}, {QUANTITIES[one].words}: {QUANTITIES[one].how}" for body, one in suggestion.bodies]
+        weighed = f"""## What to measure of single bodies
+
+It takes minutes, and tells a wrong density, size or shape from everything else. Write into `{BODIES}` the mean and its
+standard error (from the scatter of lots or bodies, and what the instrument may be off).
+
+{_lines(kinds)}
+
+"""
     return f"""# To be measured next: {experiment.name}
 
 The data of {title} leave {len(suggestion.rivals)} answers: {answers}. These pours are to tell them apart.
@@ -364,10 +392,10 @@ All else stays as it was, and bodies enter right above the feed opening, whereve
 
 Pour **{pours} times**, each time onto the bare plate.{reading}
 
-## What it will decide
+{weighed}## What it will decide
 
-{pours} pours give the right answer with a chance of **{percent(experiment.chance)}**, by simulated pours of the
-likeliest of these. {FOLLOW_UPS_SO_FAR}
+{pours} pours{" and these numbers" if weighed else ""} give the right answer with a chance of
+**{percent(experiment.chance)}**, by simulated pours of the likeliest of these. {FOLLOW_UPS_SO_FAR}
 (An effect is named with {percent(THRESHOLD)} or more, alone or with others; nothing missing is the answer with
 {percent(NOTHING_FROM)} or more.)
 

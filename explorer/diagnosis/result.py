@@ -9,6 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 import numpy.typing as npt
 
+from doe.declared.bodies import BodyRow
 from doe.declared.model import CandidateEffect, effect_values
 from doe.diagnose.result import (
     BASE,
@@ -249,6 +250,8 @@ class DiagnosisResult(Document):
     given: dict[str, tuple[float, ...]] = field(default_factory=dict)
     """Effects that the declared model holds by an earlier answer, with the amplitudes [natural units] about which they
     were calibrated here (`doe.declared.given`)."""
+    bodies: tuple[BodyRow, ...] = ()
+    """What was measured of single bodies, beside both models."""
 
     @property
     def kind(self) -> Kind:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from doe.declared.bodies import body_rows
 from doe.declared.budget import Budget, scaled_budget
 from doe.declared.given import Given, with_given
 from doe.declared.model import effect_values
@@ -313,6 +314,10 @@ def result_of(
     """The content of ``diagnosis.json``."""
     verdict = found.verdict
     units = {s.name: s.unit for condition in found.conditions for s in summaries(condition)}
+    final = next((row for row in verdict.effects if row.name == verdict.final), None)
+    acting: dict[str, list[float]] = {}
+    for one in final.amplitudes if final is not None else ():
+        acting.setdefault(one.effect, []).append(one.value)
     return DiagnosisResult(
         verdict=verdict.kind,
         statement=verdict.statement,
@@ -366,6 +371,7 @@ def result_of(
             name: tuple(float(value(measurement.scene, path)) for path in effect_values(name, amplitude))
             for name, amplitude in given.items()
         },
+        bodies=tuple(body_rows(found.conditions[0].scene, found.bodies, acting)),
         units=units,
         pours=PourCounts(found.pours, found.settings),
         timing=Duration(total_s),

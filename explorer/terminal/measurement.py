@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from doe.measurement import Condition, Measurement, Observation, Reach, reach_of
+from doe.measurement.bodies import QUANTITIES
 from doe.measurement.features import PROFILE, SCAN, feature_set, offer_of, resolution
 from doe.record import plain
 from explorer.terminal.text_table import text_table
@@ -21,6 +22,8 @@ def check_text(measurement: Measurement) -> str:
     parts = [f"{measurement.folder}: {measurement.title}".rstrip(": ")]
     parts += [_condition_text(condition) for condition in measurement.conditions]
     parts.append(_parameters_text(measurement))
+    if measurement.bodies:
+        parts.append(_bodies_text(measurement))
     if measurement.cross_check:
         parts.append(_cross_check_text(measurement))
     parts.append(_reach_text(reach))
@@ -36,11 +39,20 @@ def check_result(measurement: Measurement) -> dict[str, Any]:
         "title": measurement.title,
         "conditions": [_condition_result(condition) for condition in measurement.conditions],
         "parameters": plain(measurement.parameters),
+        "bodies": plain(measurement.bodies),
         "cross_check": plain(measurement.cross_check),
         "reach": plain(reach_of(measurement)),
         "ignored": plain(measurement.ignored),
         "notes": plain(measurement.notes),
     }
+
+
+def _bodies_text(measurement: Measurement) -> str:
+    rows = [
+        (one.body, one.quantity, QUANTITIES[one.quantity].unit, f"{one.mean:.4g}", f"{one.standard_error:.2g}")
+        for one in measurement.bodies
+    ]
+    return f"single bodies\n{text_table(('component', 'quantity', 'unit', 'mean', 'standard error'), rows)}"
 
 
 def _condition_text(condition: Condition) -> str:

@@ -9,7 +9,15 @@ from explorer.diagnosis.result import DiagnosisResult
 from explorer.report.content import Report, Section
 from explorer.report.data import diagnosis_data
 from explorer.report.diagnosis.answer import banner, could_have_seen, in_short, rivals
-from explorer.report.diagnosis.evidence import effects, error, over_the_plate, parameters, pile, residuals
+from explorer.report.diagnosis.evidence import (
+    effects,
+    error,
+    over_the_plate,
+    parameters,
+    pile,
+    residuals,
+    single_bodies,
+)
 from explorer.report.diagnosis.method import data, for_a_paper, how_reached, repeat
 from explorer.report.html import page
 from explorer.report.markdown import document
@@ -25,6 +33,7 @@ SECTIONS: tuple[Callable[[DiagnosisResult], Section | None], ...] = (
     pile,
     over_the_plate,
     residuals,
+    single_bodies,
     effects,
     parameters,
     data,

@@ -343,7 +343,11 @@ def _asked_for(result: DiagnosisResult) -> str:
         return "No change of the rig that was tried would tell them apart."
     first = result.next_experiment[0]
     best, pours = first.experiment, first.pours
-    text = f"{pours} pours of {code(best.name)} would single out the right one with a chance of {percent(best.chance)}."
+    what = f"{pours} pours of {code(best.name)}"
+    if first.bodies:
+        numbers = dict.fromkeys(quantity.replace("_", " ") for _, quantity in first.bodies)
+        what += f", with {enumeration(list(numbers))} of single bodies,"
+    text = f"{what} would single out the right one with a chance of {percent(best.chance)}."
     return f"{text} {FOLLOW_UPS_SO_FAR}"
 
 

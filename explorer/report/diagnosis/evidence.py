@@ -9,6 +9,7 @@ import numpy as np
 from doe.declared.model import effect_of
 from doe.diagnose.result import BASE, EffectRow
 from doe.holdout import OVERALL
+from doe.measurement.bodies import QUANTITIES
 from doe.measurement.measurement import Role
 from doe.measurement.residual_map import ResidualMap
 from explorer.diagnosis.result import DiagnosisResult, ErrorRow, PileProfiles
@@ -36,6 +37,7 @@ from explorer.units import (
     parameter_range,
     parameter_value,
     percent,
+    quantity,
     signed,
 )
 from solver.effects import EFFECTS
@@ -289,6 +291,30 @@ def _bounds(result: DiagnosisResult) -> Table:
     )
     header = ("effect", "range", "strongest supported", "by", "what reveals it")
     return Table(header, rows, "The range is that in which every condition can be set up.")
+
+
+def single_bodies(result: DiagnosisResult) -> Section | None:
+    """What was measured of single bodies, beside both models; None where nothing was."""
+    if not result.bodies:
+        return None
+    rows = tuple(
+        (
+            row.body,
+            QUANTITIES[row.quantity].words,
+            f"{quantity(row.mean, row.unit)} ± {quantity(row.standard_error, row.unit)}",
+            quantity(row.declared, row.unit),
+            signed((row.mean - row.declared) / row.standard_error, 1),
+            quantity(row.final, row.unit),
+            signed((row.mean - row.final) / row.standard_error, 1),
+        )
+        for row in result.bodies
+    )
+    header = ("component", "number", "measured", "declared", "off, SE", "final model", "off, SE")
+    text = (
+        "Weighed and measured one by one, without a pour: this tells effects that change the bodies themselves from "
+        f"all others, and enters the probabilities. Final model: {final_model(result)}."
+    )
+    return Section("Single bodies", (Text(text), Table(header, rows, "± and SE: standard error of the mean.")))
 
 
 def parameters(result: DiagnosisResult) -> Section:

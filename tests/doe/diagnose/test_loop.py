@@ -269,7 +269,7 @@ class Rehearsed:
     """Training pours whose every look ends with the next of the posteriors in ``steps``: name and probability."""
 
     def __init__(self, steps):
-        self._steps, self.looks, self.ways = iter(steps), 0, ()
+        self._steps, self.looks, self.ways, self.declared = iter(steps), 0, (), None
 
     def compared(self, *_):
         name, p = next(self._steps)
@@ -305,7 +305,7 @@ def test_an_effect_that_two_looks_leave_named_gets_no_third(steps, looks, monkey
     training = Rehearsed(steps)
     monkeypatch.setattr(diagnosis, "weighed", training.compared)
     monkeypatch.setattr(diagnosis, "inseparable", lambda compared, name: "")
-    diagnosis.pursued(training, (), Budget(), print, False)
+    diagnosis.pursued(training, SimpleNamespace(fit=(), bodies=()), Budget(), print, False)
     assert training.looks == looks
 
 
@@ -566,7 +566,7 @@ def test_without_held_out_conditions_nothing_is_confirmed_or_taken_back(measurem
     measure(monkeypatch, (), seed=1)
     declared = declare(measurement, NAMES[:1])
     training = TrainingPours(declared, measurement.fit, FormulaPours(measurement.fit, (), None, None), BUDGET, print)
-    compared = diagnosis.pursued(training, measurement.fit, BUDGET, print, False)
+    compared = diagnosis.pursued(training, measurement, BUDGET, print, False)
     verdict = diagnosis.verdict_of(compared, declared, training.pours, False)
     conclusion, after = diagnosis.concluded(verdict, compared, declared, (), FormulaPours((), (), None, None), print)
     assert after == verdict

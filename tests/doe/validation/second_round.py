@@ -64,7 +64,7 @@ class Asked:
         declared, budget = declare(measurement, tuple(EFFECTS)), self._answers.budget
         training = TrainingPours(declared, measurement.fit, pours_in(measurement.fit), budget, lambda line: None)
         followed_up = is_last and self._answers.follow_up
-        compared = pursued(training, measurement.fit, budget, lambda line: None, followed_up)
+        compared = pursued(training, measurement, budget, lambda line: None, followed_up)
         verdict = verdict_of(compared, declared, training.pours, followed_up)
         found = compared.posterior
         if is_last:
@@ -72,7 +72,7 @@ class Asked:
         return (
             verdict,
             found,
-            next(iter(suggested(verdict, found, training, measurement.fit, pours_in).suggestions), None),
+            next(iter(suggested(verdict, found, training, measurement, pours_in).suggestions), None),
         )
 
     def after_follow_up(self, measurement, given):

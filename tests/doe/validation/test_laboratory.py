@@ -15,13 +15,13 @@ from doe.measurement.condition_table import in_rig
 from doe.measurement.features import SCALARS, SCAN, features_of_data, offer_of
 from doe.store import Store
 from doe.validation.campaign import OFFERS, SETS, Answers, CampaignOrder, run_campaign
-from doe.validation.laboratory import TREFOILS, read_laboratory
+from doe.validation.laboratory import TREFOILS, read_laboratory, table_of_bodies
 from doe.validation.outside import OUTSIDE_EFFECTS, possible_outside
 from doe.validation.scanner import Scanner
 from doe.validation.sets import SetRow, append_rows
 from doe.validation.truth import REPLICATES, Case, Truth
 from doe.validation.work_place import WorkPlace
-from solver import AssetNotFoundError
+from solver import AssetNotFoundError, actual, with_values
 from tests.doe.validation.small_model import small_laboratory
 
 
@@ -139,3 +139,38 @@ def test_a_set_is_there_once_it_is_judged_by_every_kind_of_data(tmp_path):
         append_rows(tmp_path / SETS, [found])
         run_campaign(order, said.append)
     assert [line.partition(": ")[2] for line in said] == ["0 of 1 data sets are done", "1 of 1 data sets are done"]
+
+
+def test_its_balance_and_caliper_are_right_within_what_they_state():
+    """Over 400 laboratories means of (measured − true)/standard error about 0, their deviation about 1."""
+    scene = read_laboratory(TREFOILS).declared.scene
+    asked = [("trefoil", name) for name in ("mass", "length", "length_spread")]
+    scattered = with_values(scene, {"effect.size_dispersion.spread": 0.12, "effect.density_error.excess": 0.1})
+    assert [body.name for body in scene.bodies] == ["trefoil"]
+    (body,) = actual(scattered).bodies
+    truth = {"mass": body.mean_mass, "length": max(body.extents), "length_spread": 0.12}
+    z = {name: [] for name in truth}
+    for seed in range(400):
+        head, *rows = table_of_bodies(scattered, asked, np.random.default_rng(seed)).splitlines()
+        assert head == "body,quantity,unit,mean,standard_error"
+        for row in rows:
+            _, name, _, mean, error = row.split(",")
+            z[name].append((float(mean) - truth[name]) / float(error))
+    for name, found in z.items():
+        # A mean of few lots is a little off in its standard error: t with four degrees of freedom has 1.4.
+        assert abs(np.mean(found)) < 0.25, name
+        assert 0.8 < np.std(found) < 1.5, name
+    # Bodies that are all alike: whatever spread is found is the caliper's.
+    *_, row = table_of_bodies(scene, asked, np.random.default_rng(1)).splitlines()
+    mean, error = (float(cell) for cell in row.split(",")[3:])
+    assert mean < 2.0 * error < 0.02
+
+
+def test_what_was_asked_of_bodies_is_handed_out(tmp_path):
+    laboratory = read_laboratory(TREFOILS)
+    name = laboratory.declared.fit[0].name
+    pours = [dict.fromkeys(laboratory.readings, 1.0 + 0.1 * k) for k in range(3)]
+    table = table_of_bodies(laboratory.declared.scene, [("trefoil", "mass")], np.random.default_rng(0))
+    laboratory.write(tmp_path, {name: pours}, None, table)
+    (row,) = load_measurement(tmp_path).bodies
+    assert row.mean == pytest.approx(laboratory.declared.scene.bodies[0].mass, rel=0.02)

@@ -184,6 +184,45 @@ def test_an_unfilled_folder_is_refused(tmp_path, measured):
         read_next(folder)
 
 
+BODIES = (("trefoil", "mass"), ("trefoil", "length_spread"))
+
+
+def asking_for_bodies(folder, measured):
+    asked = replace(suggestion(TWICE, values_of(measured, TWICE), measured.fit[0].name), bodies=BODIES)
+    write_next(folder, SOURCE, measured, asked)
+    return folder
+
+
+def test_single_bodies_are_asked_for_and_may_be_left_out(tmp_path, measured):
+    (body,) = {one.name for one in measured.scene.bodies}
+    assert body == BODIES[0][0]
+    folder = asking_for_bodies(tmp_path / "next", measured)
+    text = (folder / "README.md").read_text()
+    assert "- trefoil, mean mass of one body: count fifty, weigh them in five lots of ten" in text
+    assert "from body to body, over its mean: of the same thirty" in text
+    assert "3 pours and these numbers give the right answer" in text
+    bodies, pours = folder / "bodies.csv", folder / "outlet_at_twice_the_height.csv"
+    assert "# trefoil,mass,g,,\n# trefoil,length_spread,1,,\n" in bodies.read_text()
+    with pytest.raises(CommandError, match=r"outlet_at_twice_the_height\.csv: value: none is filled in yet"):
+        read_next(folder)
+    filled = re.sub(r"^# (\d+)(,[^,]*,[^,]*,)$", r"\1\g<2>0.0\1", pours.read_text(), flags=re.MULTILINE)
+    pours.write_text(filled)
+    assert read_next(folder).measurement.bodies == ()
+    bodies.write_text(bodies.read_text().replace("# trefoil,mass,g,,", "trefoil,mass,g,0.21,0.002"))
+    (row,) = read_next(folder).measurement.bodies
+    assert (row.quantity, row.mean, row.standard_error) == ("mass", pytest.approx(2.1e-4), pytest.approx(2e-6))
+    bodies.write_text(bodies.read_text().replace("0.21,0.002", "0.21,"))
+    with pytest.raises(MeasurementError, match=r"bodies\.csv:\d+: standard_error: "):
+        read_next(folder)
+
+
+def test_without_bodies_none_are_asked_for(tmp_path, measured):
+    folder = written(tmp_path / "next", SOURCE, measured)
+    assert not (folder / "bodies.csv").exists()
+    assert "bodies" not in tomllib.loads((folder / "measurement.toml").read_text())
+    assert "single bodies" not in (folder / "README.md").read_text()
+
+
 def test_a_row_without_its_value_is_named(tmp_path, measured):
     folder = fill(written(tmp_path / "next", SOURCE, measured))
     (table,) = folder.glob("*.csv")

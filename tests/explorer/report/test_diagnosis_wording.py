@@ -90,6 +90,23 @@ def test_a_named_effect_that_may_not_be_alone_is_told_so(results):
     assert "with probability 60.0 %, alone (60.0 %)" in verdict_sentence(before)
 
 
+def test_single_bodies_stand_beside_both_models(results):
+    assert "## Single bodies" not in diagnosis_markdown(results["effect"])
+    row = {"body": "bead", "quantity": "mass", "unit": "kg", "mean": 2.2e-3, "standard_error": 2e-5}
+    result = copy.deepcopy(results["effect"]) | {"bodies": [row | {"declared": 2e-3, "final": 2.19e-3}]}
+    text = diagnosis_markdown(result).partition("## Single bodies")[2].partition("## ")[0]
+    assert "| bead | mean mass of one body | 2.2 g ± 0.02 g | 2 g | +10.0 | 2.19 g | +0.5 |" in text
+
+
+def test_a_follow_up_that_asks_for_bodies_says_so(results):
+    result = copy.deepcopy(results["ambiguous"])
+    result["next_experiment"][0]["bodies"] = [["bead", "mass"], ["bead", "length_spread"]]
+    assert (
+        "6 pours of `half the mass`, with mass and length spread of single bodies, would single out the right one"
+        in verdict_sentence(result)
+    )
+
+
 def test_a_declared_model_that_does_not_fit_and_has_no_rival_is_called_so(results):
     result = copy.deepcopy(results["nothing"]) | {"verdict": "unexplained"}
     assert verdict_sentence(result).startswith("The calibrated declared model does not fit the data, and no effect")

@@ -1,0 +1,121 @@
+"""What single bodies say of effects, against closed forms."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from doe.declared.bodies import body_evidence, body_rows, wanted_bodies
+from doe.declared.model import declare
+from doe.measurement import load_measurement
+from doe.measurement.bodies import MeasuredBody
+from doe.measurement.measurement import MeasuredParameter
+from solver import EFFECTS
+from tests.doe.measurement.folders import write
+
+MASS = 2500.0 * math.pi / 6.0 * 12e-3**3
+NAMES = tuple(EFFECTS)
+
+
+@pytest.fixture
+def data(tmp_path):
+    return load_measurement(write(tmp_path))
+
+
+def evidence_of(data, *rows):
+    data = replace(data, bodies=rows)
+    return body_evidence(data, declare(data, NAMES))
+
+
+def test_a_weighed_density_is_that_of_a_gaussian(data):
+    """Ten per cent heavier, known to one per cent: ln 1.1/0.01 standard errors off, less what the density explains."""
+    found = evidence_of(data, MeasuredBody("bead", "mass", 1.1 * MASS, 0.011 * MASS))
+    off = math.log(1.1) / 0.01
+    assert found.off == pytest.approx([off])
+    assert found.log_density("base", np.zeros((1, 0)), 1.15) == pytest.approx([-0.5 * off**2])
+    at = np.array([[0.05], [0.1], [0.2]])
+    wanted = -0.5 * ((math.log(1.1) - np.log1p(at[:, 0])) / 0.01) ** 2
+    # A cell of no width; straight lines between amplitudes are off by less than a thousandth of a shift.
+    assert found.log_density("density_error", at, 1.0 + 1e-9) == pytest.approx(wanted, abs=0.05)
+
+
+def test_a_cell_is_averaged_over(data):
+    """Its amplitudes a are spread evenly over ln a: ∫ N(ln(1 + a)) d ln a over the cell."""
+    found = evidence_of(data, MeasuredBody("bead", "mass", 1.2 * MASS, 0.012 * MASS))
+    fine = 0.2 * 1.15 ** np.linspace(-0.5, 0.5, 2001)
+    wanted = math.log(np.exp(-0.5 * ((math.log(1.2) - np.log1p(fine)) / 0.01) ** 2).mean())
+    assert found.log_density("density_error", np.array([[0.2]]), 1.15)[0] == pytest.approx(wanted, abs=0.02)
+
+
+def test_two_effects_add_and_what_changes_no_body_does_not_matter(data):
+    rows = (
+        MeasuredBody("bead", "mass", 1.1 * MASS, 0.011 * MASS),
+        MeasuredBody("bead", "length", 12e-3 * 1.2, 12e-5 * 1.2),
+    )
+    found = evidence_of(data, *rows)
+    cell = 1.0 + 1e-9
+    both = found.log_density("density_error+shape_elongation", np.array([[0.1, 0.2]]), cell)
+    assert both == pytest.approx([0.0], abs=0.1)
+    assert found.log_density("plate_tilt+density_error", np.array([[3.0, 1.0, 0.1]]), cell) == pytest.approx(
+        [-0.5 * (math.log(1.2) / 0.01) ** 2], rel=0.01
+    )
+    assert not found.moved_by("rolling_resistance")
+    assert not found.moved_by("funnel_offset")
+    assert found.log_density("rolling_resistance", np.array([[0.1]]), cell) == pytest.approx(
+        found.log_density("base", np.zeros((1, 0)), cell)
+    )
+
+
+def test_averages_weigh_pairs_too(data):
+    """Mass by both of two effects: the mean over both cells, by brute force."""
+    found = evidence_of(data, MeasuredBody("bead", "mass", 1.1 * MASS, 0.033 * MASS))
+    steps = 1.5 ** np.linspace(-0.5, 0.5, 101)
+    heavier, spread = np.log1p(0.08 * steps), 3.0 * np.log1p((0.1 * steps) ** 2)
+    density = stats.norm.pdf((math.log(1.1) - heavier[:, None] - spread) / 0.03).mean() / stats.norm.pdf(0.0)
+    label, at = "size_dispersion+density_error", np.array([[0.1, 0.08]])
+    assert found.log_density(label, at, 1.5)[0] == pytest.approx(math.log(density), abs=0.05)
+
+
+def test_what_is_calibrated_is_left_out(data):
+    density = MeasuredParameter("material.glass.density", 2000.0, 3000.0, None, None, "kg/m3")
+    data = replace(data, parameters=(*data.parameters, density))
+    mass = MeasuredBody("bead", "mass", 1.1 * MASS, 0.011 * MASS)
+    assert evidence_of(data, mass) is None
+    (kept,) = evidence_of(data, mass, MeasuredBody("bead", "length", 12e-3, 1e-4)).rows
+    assert kept.quantity == "length"
+    assert evidence_of(data) is None
+
+
+@pytest.mark.parametrize(
+    ("labels", "wanted"),
+    [
+        (("density_error", "adhesion_jkr"), ["mass"]),
+        (("shape_elongation+adhesion_jkr",), ["length"]),
+        (("size_dispersion",), ["mass", "length_spread"]),
+        (("rolling_resistance", "plate_tilt"), []),
+    ],
+)
+def test_what_tells_is_asked_for(data, labels, wanted):
+    found = wanted_bodies(data, declare(data, NAMES), labels)
+    assert ([] if found is None else [row.quantity for row in found.rows]) == wanted
+
+
+def test_what_is_measured_is_not_asked_for_again(data):
+    data = replace(data, bodies=(MeasuredBody("bead", "mass", MASS, 0.01 * MASS),))
+    assert wanted_bodies(data, declare(data, NAMES), ("density_error",)) is None
+
+
+def test_a_prediction_knows_how_well_its_amplitude_is_known(data):
+    found = wanted_bodies(data, declare(data, NAMES), ("density_error",))
+    mean, covariance = found.predicted([("density_error", 0.1, 0.05), ("rolling_resistance", 0.1, 0.02)])
+    assert mean == pytest.approx([math.log(1.1) / 0.01], rel=1e-3)
+    assert covariance == pytest.approx(np.array([[1.0 + (math.log(1.15 / 1.1) / 0.01) ** 2]]), rel=0.01)
+    assert found.predicted([])[0] == pytest.approx([0.0])
+
+
+def test_rows_stand_beside_both_models(data):
+    measured = [MeasuredBody("bead", "mass", 1.1 * MASS, 0.011 * MASS)]
+    (row,) = body_rows(data.fit[0].scene, measured, {"density_error": [0.1]})
+    assert (row.declared, row.final, row.unit) == (pytest.approx(MASS), pytest.approx(1.1 * MASS), "kg")

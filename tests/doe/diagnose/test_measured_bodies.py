@@ -1,0 +1,92 @@
+"""What single bodies say joins what pours say: a posterior, and the chance of a follow-up that asks for them."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from doe.declared.bodies import BodyEvidence, body_evidence, wanted_bodies
+from doe.declared.model import declare
+from doe.diagnose.candidate_experiments import _with_bodies
+from doe.diagnose.compared_features import MeasuredFeatures, weighed
+from doe.diagnose.emulator import Lessons, Way
+from doe.diagnose.next_experiment import CandidateExperiment, Prediction, chance_of_an_answer
+from doe.diagnose.result import Amplitude
+from doe.measurement import load_measurement
+from doe.measurement.bodies import MeasuredBody
+from solver import EFFECTS
+from tests.doe.measurement.folders import write
+
+MASS = 2500.0 * math.pi / 6.0 * 12e-3**3
+ALIKE = ("density_error", "rolling_resistance")
+WAYS = tuple(Way(name, name, (0.1,), 2.0) for name in ALIKE)
+
+
+@pytest.fixture
+def data(tmp_path):
+    return load_measurement(write(tmp_path))
+
+
+def compared(bodies: BodyEvidence | None):
+    """Six pours shifted by what each of two effects does alike: by pours alone nobody can tell which it is."""
+    rng = np.random.default_rng(0)
+    way = np.repeat([-1, 0, 1], 100)
+    block = rng.standard_normal((300, 4))
+    block[way >= 0] += 2.0 * np.eye(4)[0]
+    theta = np.where(np.arange(300) % 2, 1.0, -1.0)[:, None]
+    taught = Lessons(theta, way, (way >= 0).astype(float), np.ones(300, bool), (block,))
+    values = rng.standard_normal((6, 4))
+    values += 2.0 * np.eye(4)[0] - values.mean(axis=0)
+    features = MeasuredFeatures("low", "scalars", ("a", "b", "c", "d"), values, np.zeros(4), scalars=4)
+    return weighed(taught, WAYS, [features], (), bodies)
+
+
+def weighed_bodies(data, factor):
+    rows = (MeasuredBody("bead", "mass", factor * MASS, 0.01 * factor * MASS),)
+    return body_evidence(replace(data, bodies=rows), declare(data, tuple(EFFECTS)))
+
+
+def test_a_balance_tells_what_pours_cannot(data):
+    by_pours = compared(None).posterior
+    assert 0.3 < by_pours.effects["density_error"] / by_pours.effects["rolling_resistance"] < 3.0
+    heavier, as_declared = (compared(weighed_bodies(data, factor)).posterior for factor in (1.1, 1.0))
+    assert heavier.effects["density_error"] > 0.99
+    assert heavier.fits["density_error"].amplitudes[0].value == pytest.approx(0.1, abs=0.015)
+    assert as_declared.effects["rolling_resistance"] > 0.9
+    assert as_declared.effects["density_error"] < 0.05
+
+
+def test_the_evidence_is_that_of_pours_and_bodies_together(data):
+    by_pours, both = compared(None).posterior, compared(weighed_bodies(data, 1.02)).posterior
+    off = math.log(1.02) / 0.01
+    for name in ("base", "rolling_resistance"):
+        gained = both.fits[name].log_evidence - by_pours.fits[name].log_evidence
+        assert gained == pytest.approx(-0.5 * off**2), name
+    assert both.log_outside - by_pours.log_outside == pytest.approx(-0.5 * off**2)
+
+
+def test_a_model_that_bodies_contradict_does_not_fit(data):
+    """One more number among those that F is of."""
+    by_pours, both = compared(None), compared(weighed_bodies(data, 1.05))
+    freedom = by_pours.emulator.freedom
+    square = 4.0 * stats.f.isf(by_pours.posterior.fits["rolling_resistance"].p, 4, freedom)
+    wanted = stats.f.sf((square + (math.log(1.05) / 0.01) ** 2) / 5.0, 5, freedom)
+    assert both.posterior.fits["rolling_resistance"].p == pytest.approx(wanted)
+    assert wanted < 0.001
+
+
+def test_a_follow_up_that_asks_for_bodies_knows_what_they_will_tell(data):
+    """Pours that say nothing, and a mass ten standard errors off by one answer: a balance nearly always finds it."""
+    nothing = Prediction(np.zeros(1), np.zeros((1, 1)))
+    item = CandidateExperiment("as it is", dict.fromkeys(ALIKE, nothing))
+    bodies = wanted_bodies(data, declare(data, tuple(EFFECTS)), ALIKE)
+    found = compared(None).posterior
+    known = replace(
+        found.fits["density_error"], amplitudes=(Amplitude("density_error", 0, 0.1, 0.1 - 1e-6, 0.1 + 1e-6, False),)
+    )
+    found = replace(found, fits=found.fits | {"density_error": known})
+    weights = dict.fromkeys(ALIKE, 0.5)
+    assert chance_of_an_answer(item, weights, 6) == 0.0
+    assert chance_of_an_answer(_with_bodies(item, found, bodies), weights, 6) > 0.99
