@@ -9,17 +9,17 @@ with y₀ and s_e as the declared scene has them: no pour is needed for it. What
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
-from doe.declared.model import CandidateEffect, Declared, effect_values, possible
-from doe.measurement.bodies import QUANTITIES, MeasuredBody, body_numbers
+from doe.declared.model import CandidateEffect, Declared, effect_values
+from doe.measurement.bodies import QUANTITIES, MeasuredBody, bodies_of, body_numbers
 from doe.measurement.measurement import Measurement
 from doe.record import Record
-from solver import EFFECTS, Scene, SetUpEffect, actual, with_values
+from solver import EFFECTS, Scene, SetUpEffect, with_values
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -89,7 +89,6 @@ class BodyEvidence:
         if effect.amplitudes != 1 or not issubclass(EFFECTS[name], SetUpEffect):
             return None
         places = np.linspace(effect.low[0], effect.high[0], PLACES)
-        places = np.array([a for a in places if possible(self.scene, name, (float(a),))])
         scenes = [with_values(self.scene, effect_values(name, (float(a),))) for a in places]
         deviations = np.array([one.deviation for one in self.rows])
         still = body_numbers(self.scene, self.rows)
@@ -99,7 +98,7 @@ class BodyEvidence:
 
 def body_evidence(measurement: Measurement, declared: Declared) -> BodyEvidence | None:
     """What the measured bodies of ``measurement`` say; None where it has none that calibration leaves alone."""
-    if not measurement.bodies or not (kept := tuple(_beside_calibration(measurement.bodies, measurement))):
+    if not measurement.bodies or not (kept := _beside_calibration(measurement.bodies, measurement)):
         return None
     scene = measurement.fit[0].scene
     off = (np.array([one.value for one in kept]) - body_numbers(scene, kept)) / [one.deviation for one in kept]
@@ -119,14 +118,14 @@ def wanted_bodies(measurement: Measurement, declared: Declared, labels: Sequence
             if (body.name, name) not in known:
                 mean = quantity.of(body)
                 rows.append(MeasuredBody(body.name, name, mean, quantity.usual * (mean if quantity.relative else 1.0)))
-    rows = list(_beside_calibration(rows, measurement))
-    full = BodyEvidence(scene, tuple(rows), np.zeros(len(rows)), declared.effects)
+    left = _beside_calibration(rows, measurement)
+    full = BodyEvidence(scene, left, np.zeros(len(left)), declared.effects)
     asked = {name for label in labels for name in label.split("+")}
     ends = {one.name: np.array([one.low[0], one.high[0]]) for one in declared.effects if one.name in asked}
-    told = np.zeros(len(rows), bool)
+    told = np.zeros(len(left), bool)
     for name, pair in ends.items():
         told |= (np.abs(full.shift(name, pair)) > 1.0).any(axis=0)
-    kept = tuple(row for row, tells in zip(rows, told, strict=True) if tells)
+    kept = tuple(row for row, tells in zip(left, told, strict=True) if tells)
     return BodyEvidence(scene, kept, np.zeros(len(kept)), declared.effects) if kept else None
 
 
@@ -148,20 +147,19 @@ def body_rows(scene: Scene, measured: Sequence[MeasuredBody], acting: Mapping[st
     final = with_values(
         scene, {path: x for name, one in acting.items() for path, x in effect_values(name, one).items()}
     )
-    rows = []
-    for one in measured:
-        kind = QUANTITIES[one.quantity]
-        before, after = (
-            next(kind.of(body) for body in actual(found).bodies if body.name == one.body) for found in (scene, final)
+    both = zip(measured, bodies_of(scene, measured), bodies_of(final, measured), strict=True)
+    return [
+        BodyRow(
+            one.body, one.quantity, QUANTITIES[one.quantity].unit, one.mean, one.standard_error, declared, with_effects
         )
-        rows.append(BodyRow(one.body, one.quantity, kind.unit, one.mean, one.standard_error, before, after))
-    return rows
+        for one, declared, with_effects in both
+    ]
 
 
-def _beside_calibration(rows: Iterable[MeasuredBody], measurement: Measurement) -> Iterator[MeasuredBody]:
+def _beside_calibration(rows: Sequence[MeasuredBody], measurement: Measurement) -> tuple[MeasuredBody, ...]:
     """Those that no calibrated parameter changes."""
-    scene = measurement.fit[0].scene
-    ends = [[with_values(scene, {p.path: end}) for end in (p.low, p.high)] for p in measurement.parameters]
-    for row in rows:
-        if all(body_numbers(low, [row])[0] == body_numbers(high, [row])[0] for low, high in ends):
-            yield row
+    scene, moved = measurement.fit[0].scene, np.zeros(len(rows), bool)
+    for p in measurement.parameters:
+        low, high = (body_numbers(with_values(scene, {p.path: end}), rows) for end in (p.low, p.high))
+        moved |= low != high
+    return tuple(row for row, is_moved in zip(rows, moved, strict=True) if not is_moved)

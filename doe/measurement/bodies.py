@@ -48,6 +48,10 @@ class BodyQuantity:
     usual: float
     relative: bool = True
 
+    def on_scale(self, x: float) -> float:
+        """``x`` on the scale on which effects add up."""
+        return math.log(x) if self.relative else x
+
 
 QUANTITIES: Mapping[str, BodyQuantity] = {
     "mass": BodyQuantity(
@@ -90,7 +94,7 @@ class MeasuredBody(Record):
     @property
     def value(self) -> float:
         """The mean on the scale on which effects add up."""
-        return math.log(self.mean) if QUANTITIES[self.quantity].relative else self.mean
+        return QUANTITIES[self.quantity].on_scale(self.mean)
 
     @property
     def deviation(self) -> float:
@@ -98,11 +102,16 @@ class MeasuredBody(Record):
         return self.standard_error / self.mean if QUANTITIES[self.quantity].relative else self.standard_error
 
 
-def body_numbers(scene: Scene, asked: Sequence[MeasuredBody]) -> Array:
-    """What ``scene``, with the effects in it, has in place of ``asked``, on their scales, (q,)."""
+def bodies_of(scene: Scene, asked: Sequence[MeasuredBody]) -> list[float]:
+    """What ``scene``, with the effects in it, has in place of ``asked``, SI."""
     bodies = {body.name: body for body in actual(scene).bodies}
-    found = [(QUANTITIES[one.quantity], QUANTITIES[one.quantity].of(bodies[one.body])) for one in asked]
-    return np.array([math.log(x) if quantity.relative else x for quantity, x in found])
+    return [QUANTITIES[one.quantity].of(bodies[one.body]) for one in asked]
+
+
+def body_numbers(scene: Scene, asked: Sequence[MeasuredBody]) -> Array:
+    """The same on the scales on which effects add up, (q,)."""
+    found = zip(asked, bodies_of(scene, asked), strict=True)
+    return np.array([QUANTITIES[one.quantity].on_scale(x) for one, x in found])
 
 
 def read_bodies(path: Path, scene: Scene) -> tuple[MeasuredBody, ...]:
