@@ -284,6 +284,26 @@ def test_open_rooms_are_open_again_when_the_page_is_loaded_again(page, address):
     second.close()
 
 
+def test_a_room_that_is_opened_while_the_page_loads_is_not_closed_by_those_of_the_page_before(page, address):
+    second = page.context.browser.new_page(viewport={"width": 1280, "height": 900})
+    second.set_default_timeout(PATIENCE)
+    second.add_init_script(BEGUN)
+    # Looks for what is to be opened again come twenty times as slowly, as on a busy machine, and are counted.
+    second.add_init_script("""
+        try { sessionStorage.setItem('explorer-rooms', '["Calibrate"]') } catch { /* an empty page has none */ }
+        const soon = window.setTimeout.bind(window);
+        window.looks = 0;
+        window.setTimeout = (act, wait, ...rest) =>
+            wait === 250 ? soon(() => { act(); window.looks += 1; }, 20 * wait) : soon(act, wait, ...rest);
+    """)
+    second.goto(address)
+    room(second, "Diagnose")
+    looks = second.evaluate("window.looks")
+    second.wait_for_function("before => window.looks > before", arg=looks)
+    second.get_by_role("tab", name="Diagnose", selected=True).wait_for()
+    second.close()
+
+
 def test_rooms_are_reached_in_the_window_of_a_phone(page, address):
     phone = page.context.browser.new_page(viewport={"width": 390, "height": 844}, has_touch=True)
     phone.set_default_timeout(PATIENCE)

@@ -111,6 +111,8 @@ def test_the_newest_finished_study_is_a_board_with_its_verdict_and_charts(page):
     shown = board(page, "Study")
     shown.locator(".banner strong").wait_for()
     assert "CALIBRATED WITHIN" in shown.locator(".banner strong").inner_text()
+    # A chart is drawn once it is in sight.
+    shown.locator("figure").first.scroll_into_view_if_needed()
     shown.locator("figure .js-plotly-plot").first.wait_for()
     page.locator("#state-line").get_by_text("calibrated within").wait_for()
     # A column is sorted by its head, and a row opens its run in the scene.

@@ -8,6 +8,7 @@ const RECONNECT_MS = 1000;
 const SMALL_WINDOW = 700;  // pixels, as viser's own
 const LATEST_MS = 10000;  // until which what stands in a room may still come
 let channel = null, sought = null;
+let restoring = true;  // the rooms of the page that was left, until somebody opens one
 
 // What is asked for while the page still connects is sent once it has; after that, only while it is connected.
 let unsent = [];
@@ -23,6 +24,7 @@ const isOpen = tab => tab.getAttribute("aria-selected") === "true";
 
 // A tab by its name: in a panel that is open, folded to the edge of the window, or in a small window's bottom sheet.
 function openRoom(name) {
+  restoring = false;
   const tab = () => tabOf(name);
   const sheet = () => [...document.querySelectorAll("#root [role=button]")].find(
     one => (one.getAttribute("aria-label") || "").startsWith("Expand panel") && one.textContent.includes(name));
@@ -50,7 +52,11 @@ function keepOnTop(find) {
   setTimeout(again, 250);
 }
 for (const touch of ["pointerdown", "wheel", "keydown"]) {
-  document.addEventListener(touch, event => { if (event.isTrusted) sought = null; }, { capture: true, passive: true });
+  document.addEventListener(touch, event => {
+    if (!event.isTrusted) return;
+    sought = null;
+    if (touch !== "wheel" && event.target.closest?.("[role=tab]")) restoring = false;
+  }, { capture: true, passive: true });
 }
 
 // Does something with what is not there yet, but within seconds.
@@ -223,14 +229,15 @@ function connect() {
 connect();
 if (!localStorage.getItem("explorer-begun")) beginning.showModal();
 
-// The rooms that are open when a page is left are opened when it is loaded again, in this window.
+// The rooms that are open when a page is left are opened when it is loaded again, in this window. They come late on a
+// busy machine: not after a room that was opened in the meantime.
 const ROOMS = "explorer-rooms", PATIENT = 240;  // tries: a minute, for a page on a busy machine
 window.addEventListener("pagehide", () => {
   sessionStorage.setItem(ROOMS, JSON.stringify(tabs().filter(isOpen).map(one => one.textContent.trim())));
 });
 for (const room of JSON.parse(sessionStorage.getItem(ROOMS) || "[]")) {
   soon(() => tabOf(room), tab => {
-    if (isOpen(tab)) return;
+    if (!restoring || isOpen(tab)) return;
     press(tab);
     tab.blur();
   }, PATIENT);
