@@ -43,6 +43,8 @@ from solver.assets import own_path
 from solver.rigs.surface import Revolved, SurfacePose
 
 ORDER, SCHEMA, BODIES = "follow_up.json", 1, "bodies.csv"
+NEXT = "next"
+"""Name of the folder, in that of the diagnosis."""
 DROPPED = ("images", "mean_of", "material")
 """Keys of a condition that are about pours that were made; its own material is that of the whole follow-up."""
 PROTOCOLS = {
@@ -413,6 +415,8 @@ The table needs two pours or more. If a setting came out otherwise than asked, c
 ## The command that takes it
 
     {shlex.join(command)}
+
+On the page the same is done under *Diagnose*, *Follow-up*: there the tables can be filled in, too.
 """
 
 

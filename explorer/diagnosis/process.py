@@ -20,22 +20,24 @@ from solver import EFFECTS
 from solver.assets import measurement_folder, shipped_measurements
 
 RESULT = DiagnosisResult.NAME
-OWN, FURTHER = "-own", "-further"
-"""Behind the data's name in that of an output folder: of data that only share a shipped set's name, and of a diagnosis
-that goes on from another one."""
+OWN, FURTHER, FOLLOWED = "-own", "-further", "-followed"
+"""Behind the data's name in that of an output folder: of data that only share a shipped set's name, of a diagnosis
+that goes on from another one, and of one with a follow-up."""
 
 
 @dataclass(frozen=True)
 class Question:
     """What a diagnosis is asked. ``data``: folder of measured data, or a shipped name; ``effects``: the candidates, all
     if empty; ``budget``: about so many pours for the emulator, None for as many as the program takes by itself;
-    ``given``: folder of a finished diagnosis whose effect is in the model, "" for none.
+    ``given``: folder of a finished diagnosis whose effect is in the model, "" for none; ``follow_up``: that of a
+    follow-up which is filled in, "" for none.
     """
 
     data: str
     effects: tuple[str, ...] = ()
     budget: int | None = None
     given: str = ""
+    follow_up: str = ""
 
 
 class DiagnosisProcess(BackgroundOrders, Protocol):
@@ -106,8 +108,10 @@ class DiagnoseProcess(OrderedCommands[Question]):
         return None if found is None else found[0]
 
     def _begin(self, question: Question) -> None:
-        # One that goes on from another is not resumed by its data's name; asked again, it finds its pours in the store.
-        out = new_folder(self._folder, _stem(question.data) + (FURTHER if question.given else ""))
+        # One that goes on from another, or has a follow-up, is not resumed by its data's name; asked again, it finds
+        # its pours in the store.
+        behind = FOLLOWED if question.follow_up else FURTHER if question.given else ""
+        out = new_folder(self._folder, _stem(question.data) + behind)
         self._start(out, self._arguments(question, out))
 
     def _in_words(self, question: Question) -> str:
@@ -115,7 +119,8 @@ class DiagnoseProcess(OrderedCommands[Question]):
         few = f", {len(question.effects)} effects" if question.effects else ""
         pours = "" if question.budget is None else f", about {question.budget} pours"
         given = f", going on from {Path(question.given).name}" if question.given else ""
-        return f"{Path(question.data).name}{few}{pours}{given}"
+        followed = ", with its follow-up" if question.follow_up else ""
+        return f"{Path(question.data).name}{few}{pours}{given}{followed}"
 
     def _arguments(self, question: Question, out: Path) -> list[str]:
         """The command line that is run, as a person would type it."""
@@ -123,7 +128,8 @@ class DiagnoseProcess(OrderedCommands[Question]):
         effects = ("--effects", ",".join(question.effects)) if question.effects else ()
         budget = () if question.budget is None else ("--budget", str(question.budget))
         given = ("--given", question.given) if question.given else ()
-        asked = (*effects, *budget, *given, *store, *self._place.arguments)
+        follow_up = ("--follow-up", question.follow_up) if question.follow_up else ()
+        asked = (*effects, *budget, *given, *follow_up, *store, *self._place.arguments)
         return ["diagnose", question.data, "--out", str(out), "--apply", *asked]
 
 

@@ -31,7 +31,7 @@ from explorer.background.output_folder import kept_for_one, read_result
 from explorer.background.progress import PourProgress
 from explorer.background.reporter import Reporter
 from explorer.diagnosis.corrected import corrected_toml, study_toml
-from explorer.diagnosis.next_folder import ORDER, asks_for, read_next, write_next
+from explorer.diagnosis.next_folder import NEXT, ORDER, asks_for, read_next, write_next
 from explorer.diagnosis.result import (
     CORRECTED,
     CORRECTED_STUDY,
@@ -216,7 +216,7 @@ def _run(
             "adds it"
         )
     if found.suggestions:
-        following = order.out / "next"
+        following = order.out / NEXT
         if (following / ORDER).is_file():  # of a run that was stopped later, or one that is gone on with
             same = "" if asks_for(following, found.suggestions[0]) else "; it is not what this answer asks for"
             say(f"{following}: exists already and is not changed, as it may be filled in{same}")

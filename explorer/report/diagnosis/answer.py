@@ -79,7 +79,7 @@ def _what_next(result: DiagnosisResult) -> str:
                 f"missing beside it, {_asking_further(result)} asks."
             )
         case "ambiguous":
-            return f"{_asked_for(result)} `explorer diagnose … --follow-up` takes them."
+            return f"{follow_up_text(result)} `explorer diagnose … --follow-up` takes them."
         case "unexplained":
             further = ""
             if result.handed_on():
@@ -161,7 +161,7 @@ def _verdict(result: DiagnosisResult) -> str:
             told = [
                 f"{opening} leave {len(left)} answers: {enumeration(left)}.",
                 _in_common(result),
-                _asked_for(result),
+                follow_up_text(result),
             ]
             return " ".join(text for text in told if text)
         case "unexplained":
@@ -336,7 +336,8 @@ def _of_bounds(row: EffectRow) -> list[str]:
     return [percent(share_of_bound(name, own)) for name, own in values.items()]
 
 
-def _asked_for(result: DiagnosisResult) -> str:
+def follow_up_text(result: DiagnosisResult) -> str:
+    """What would tell the answers apart that are left, and with which chance."""
     if not result.order.plan_next:
         return "What could tell them apart was not looked for (`--no-next`)."
     if not result.next_experiment:

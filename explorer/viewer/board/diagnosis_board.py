@@ -66,6 +66,10 @@ def diagnosis_board(
 def _pressed(result: DiagnosisResult) -> Banner:
     """The verdict; what comes next by the buttons below it where there are any, and not by commands."""
     further = ["What else is missing beside it?"] if result.handed_on() else []
+    if result.kind == "ambiguous" and result.next_experiment:
+        return replace(
+            banner(result), then="Pour and measure that, fill it in under Follow-up, above, and answer with it."
+        )
     then = " ".join(["Pour the corrected model, and calibrate it.", *further])
     return replace(banner(result), then=then) if result.added else banner(result)
 

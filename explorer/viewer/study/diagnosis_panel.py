@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
+from functools import partial
 from pathlib import Path
 
 import viser
@@ -12,14 +13,17 @@ from doe.declared.budget import Budget
 from doe.record import RecordError
 from explorer.background.command_process import CommandStatus
 from explorer.background.output_folder import ResultFile
+from explorer.diagnosis.follow_up_tables import SCANNED, add_scan, packed, read_follow_up, take_filled
+from explorer.diagnosis.next_folder import NEXT, ORDER, read_next
 from explorer.diagnosis.piles import AnswerPiles, answer_piles
 from explorer.diagnosis.process import RESULT, Question
 from explorer.diagnosis.result import CORRECTED_STUDY, SHORT_PROFILE, DiagnosisResult
 from explorer.errors import CommandError
 from explorer.files.uploads import kept_measurements
+from explorer.report.diagnosis.answer import follow_up_text
 from explorer.scene.source import SceneSource
-from explorer.units import checked
-from explorer.viewer.actions import button_group
+from explorer.units import checked, code, enumeration, parameter_label, parameter_value
+from explorer.viewer.actions import button_group, on_upload
 from explorer.viewer.board.board_view import BoardView
 from explorer.viewer.board.diagnosis_board import (
     ASK_FURTHER,
@@ -31,6 +35,7 @@ from explorer.viewer.board.diagnosis_board import (
     diagnosis_board,
 )
 from explorer.viewer.output.pile_recording import PileRecording
+from explorer.viewer.output.send_file import send_file
 from explorer.viewer.panel import DIAGNOSE, SELDOM, Now, PageContext, Panel
 from explorer.viewer.study.process_view import (
     PlaceChoice,
@@ -41,6 +46,9 @@ from explorer.viewer.study.process_view import (
     waiting_markdown,
 )
 from explorer.viewer.study.result_chooser import ResultChooser
+from explorer.viewer.tables.follow_up_page import follow_up_page
+from explorer.viewer.tables.table_server import link_html
+from explorer.viewer.view import small_html
 from solver import EFFECTS, Scene
 from solver.assets import shipped_measurements
 
@@ -54,6 +62,7 @@ FIRST = "trefoil_2"
 OWN = "folder below"
 """Choice of the list that takes the folder in the text field."""
 PRESENT = "present or newest diagnosis"
+FILL_IN = "Fill it in, in a table"
 NARROW = 900
 """Pixels of a picture in which three piles stand too close to be told apart."""
 
@@ -124,6 +133,7 @@ class DiagnosisPanel(Panel):
             ASK_FURTHER: self._ask_further,
         }.items():
             page.channel.offer(name, lambda _, act=act: post(act))  # type: ignore[misc]
+        self._follow_up = FollowUp(page, self._begin_follow_up)
         self._recording = PileRecording(page, self._record_order)
         self._offer_piles()
         self._board = BoardView(server, page.pages, "/diagnosis/page.json", "Diagnosis")
@@ -213,6 +223,13 @@ class DiagnosisPanel(Panel):
             if buttons.visible != visible:
                 buttons.visible = visible
         self._recording.offer(found)
+        self._follow_up.offer(self._result, self._chooser.folder or self._present())
+
+    def _begin_follow_up(self, result: DiagnosisResult, folder: Path) -> None:
+        """Ask the same question again, with what was measured in ``folder``."""
+        order = result.order
+        question = Question(result.data.folder, order.effects, order.budget, order.given or "", str(folder))
+        self._diagnosis.start(question)
 
     def _show_piles(self) -> None:
         """Measured pile, calibrated and corrected model side by side; the middle one is the page's own pour."""
@@ -324,6 +341,109 @@ def angle_line(mean: float, sd: float) -> str:
     """A further line of a sign: mean ± standard deviation [°], as far as they are known."""
     spread = f" ± {sd:.1f}° SD" if math.isfinite(sd) else ""
     return f"\n{mean:.1f}°{spread}" if math.isfinite(mean) else ""
+
+
+class FollowUp:
+    """What an answer that is left open asks for: taken along, filled in here or elsewhere, and answered with."""
+
+    def __init__(self, page: PageContext, begin: Callable[[DiagnosisResult, Path], None]) -> None:
+        gui, post = page.server.gui, page.post
+        self._page, self._begin = page, begin
+        self._result: DiagnosisResult | None = None
+        self._folder: Path | None = None
+        self._known: Hashable = None
+        self._place = gui.add_folder("Follow-up", expand_by_default=True)
+        with self._place:
+            self._told = gui.add_markdown("")
+            where = page.tables.publish(follow_up_page(lambda: self._folder, post))
+            gui.add_html(small_html(link_html(where, FILL_IN)))
+            taken = gui.add_button(
+                "Take the folder along (.zip)",
+                hint="What to set and to measure (README.md, a drawing), and the tables to fill in.",
+            )
+            filled = gui.add_upload_button(
+                "Upload it filled in", mime_type=".zip", hint="The folder as .zip, its tables filled in, scans added."
+            )
+            # In a place of its own, as viser's client shows a button of uploads whether it is visible or not.
+            self._scans = gui.add_folder(None)
+            with self._scans:
+                scan = gui.add_upload_button(
+                    "Add a scan",
+                    mime_type=",".join(SCANNED),
+                    hint="Of the first pile that has none yet; unit and axis as in the first data.",
+                )
+            answer = gui.add_button(
+                "Answer with the follow-up", hint="Weighs all answers again, with these pours beside the others."
+            )
+        taken.on_click(lambda event: post(partial(self._send, event.client)))
+        answer.on_click(lambda _: post(self._answer))
+        on_upload(filled, self._take, post)
+        on_upload(scan, self._add_scan, post)
+
+    def offer(self, result: DiagnosisResult | None, folder: Path | None) -> None:
+        """Show what ``result`` in ``folder`` asks for, and how much of it is filled in."""
+        asked = None if folder is None or result is None or result.kind != "ambiguous" else folder / NEXT
+        self._result, self._folder = result, asked if asked and (asked / ORDER).is_file() else None
+        if self._place.visible != (self._folder is not None):
+            self._place.visible = self._folder is not None
+        if self._folder is None or result is None:
+            return
+        known = result, self._folder, _written(self._folder)
+        if known != self._known:
+            self._known = known
+            self._told.content = _follow_up_markdown(result, self._folder)
+            scanned = (self._folder / "scans").is_dir()
+            if self._scans.visible != scanned:
+                self._scans.visible = scanned
+
+    def _send(self, client: viser.ClientHandle | None) -> None:
+        _, folder = self._asked()
+        if client is not None:
+            send_file(client, f"{folder.parent.name}_follow_up.zip", packed(folder))
+
+    def _take(self, name: str, content: bytes) -> None:
+        result, folder = self._asked()
+        take_filled(folder, result.next_experiment[0], name, content, self._page.uploads)
+
+    def _add_scan(self, name: str, content: bytes) -> None:
+        add_scan(self._asked()[1], name, content)
+
+    def _answer(self) -> None:
+        result, folder = self._asked()
+        # Read here first: what is missing or wrong is told at once, and not by a process that has failed.
+        self._page.background.start(
+            "reading the follow-up", lambda: read_next(folder), lambda _: self._begin(result, folder)
+        )
+
+    def _asked(self) -> tuple[DiagnosisResult, Path]:
+        if self._result is None or self._folder is None:
+            raise CommandError("the answer that is shown asks for no follow-up")
+        return self._result, self._folder
+
+
+def _written(folder: Path) -> tuple[int, ...]:
+    """When tables and scans in ``folder`` were written."""
+    return tuple(file.stat().st_mtime_ns for file in sorted((*folder.iterdir(), *folder.glob("scans/*"))))
+
+
+def _follow_up_markdown(result: DiagnosisResult, folder: Path) -> str:
+    """What to measure, why, and how much of it there is."""
+    asked = result.next_experiment[0]
+    try:
+        tables = read_follow_up(folder)
+    except (ValueError, OSError) as error:
+        return escaped(str(error))
+    cells = tables.cells
+    scans = f", {tables.scans} of {asked.pours} scans" if (folder / "scans").is_dir() else ""
+    changes = [f"{parameter_label(path)} **{parameter_value(path, new)}**" for path, new in asked.values.items()]
+    if asked.turned:
+        changes.append("the whole rig **turned by 180° on its bench**")
+    return (
+        f"{follow_up_text(result)}\n\n"
+        f"Otherwise than in condition {code(asked.condition)}: {enumeration(changes) or 'nothing'}. "
+        "All else as before.\n\n"
+        f"Filled in: {sum(map(bool, cells))} of {len(cells)} values{scans}."
+    )
 
 
 class CandidateEffects:

@@ -48,10 +48,11 @@ def table_to_edit(
     rows: Sequence[dict[str, str]],
     entered: Callable[[Sequence[Any]], tuple[Action, str]],
     post: Post,
+    height: str = "calc(100vh - 12rem)",
 ) -> None:
     """A table with *Save*: ``entered`` makes of the rows that a browser sent what is to be done, and what is then told.
 
-    A CommandError of either is told below the table.
+    A CommandError of either is told below the table. ``height``: of the table, as CSS has it.
     """
     from nicegui import ui
 
@@ -62,7 +63,7 @@ def table_to_edit(
             "stopEditingWhenCellsLoseFocus": True,
             "enterNavigatesVerticallyAfterEdit": True,
         }
-    ).style("height: calc(100vh - 12rem)")
+    ).style(f"height: {height}")
     told = ui.label("").props("role=status")
 
     async def save() -> None:

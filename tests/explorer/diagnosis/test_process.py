@@ -10,8 +10,11 @@ from types import SimpleNamespace
 
 import pytest
 
+from doe.measurement.load import load_measurement
 from explorer.background.command_process import BackgroundError, CommandStatus
 from explorer.background.events import StageProgress
+from explorer.diagnosis.follow_up_tables import read_follow_up
+from explorer.diagnosis.next_folder import write_next
 from explorer.diagnosis.process import RESULT, DiagnoseProcess, Question
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.priority import BACKGROUND
@@ -30,6 +33,7 @@ from solver import EFFECTS, AssetNotFoundError, with_values
 from solver.assets import measurement_folder
 from tests.explorer.background.waiting import only_folder, wait_for
 from tests.explorer.diagnosed import result_of_case, typed
+from tests.explorer.diagnosis.test_next_folder import fill
 from tests.explorer.viewer.page_session import PageSession, finished, page_context
 from tests.explorer.viewer.person import Person
 from tests.explorer.viewer.study_panel_at_hand import board_at
@@ -432,6 +436,68 @@ def test_a_diagnosis_that_goes_on_from_another_names_it_and_is_none_to_resume(tm
     arguments = json.loads((folder / "arguments.json").read_text())
     assert arguments[arguments.index("--given") + 1] == "results/first"
     # Resumed by its data's name it would be another question.
+    assert process.stopped(Question("trefoil_1")) is None
+
+
+def test_a_follow_up_is_filled_in_and_answered_with_on_the_page(room, tmp_path):
+    content = result_of_case("ambiguous")
+    content["order"] |= {"effects": ["rolling_resistance", "twisting"], "given": "results/first"}
+    room.found(content)
+    assert not room.person.sees("Answer with the follow-up")  # that folder is not there
+    source, asked = measurement_folder("trefoil_2"), typed(content).next_experiment[0]
+    write_next(tmp_path / "next", source, load_measurement(source), asked)
+    room.show()
+    told, all_of_it = room.person.within("Follow-up"), len(read_follow_up(tmp_path / "next").cells)
+    assert "outlet height 120 mm" in told.text.replace("*", "")
+    assert f"Filled in: 0 of {all_of_it} values, 0 of 6 scans." in told.text
+    assert "Fill it in, in a table" in told.text
+    then = board(room.panel)["banner"]["then"]
+    assert "under Follow-up" in then
+    assert "explorer diagnose" not in then
+    assert "value: none is filled in yet" in room.person.press("Answer with the follow-up")
+    # Taken along, filled in elsewhere, and sent back with a scan.
+    room.person.press("Take the folder along (.zip)")
+    ((name, archive),) = room.person.browser.sent.items()
+    assert name == f"{tmp_path.name}_follow_up.zip"
+    elsewhere = tmp_path / "elsewhere"
+    shutil.unpack_archive(_kept(tmp_path / name, archive), elsewhere)
+    fill(elsewhere)
+    back = Path(shutil.make_archive(str(tmp_path / "back"), "zip", elsewhere)).read_bytes()
+    assert room.person.upload("Upload it filled in", "back.zip", back) == ""
+    assert room.person.upload("Add a scan", "monday.ply", b"ply") == ""
+    room.show()
+    assert f"Filled in: {all_of_it} of {all_of_it} values, 1 of 6 scans." in told.text
+    assert "monday" not in room.person.press("Answer with the follow-up")
+    assert room.process.asked == []  # a scan that is none is said before anything is started
+    next((tmp_path / "next/scans").glob("*_1.ply")).unlink()
+    assert room.person.press("Answer with the follow-up") == ""
+    question = Question(
+        "data/made up", ("rolling_resistance", "twisting"), 900, "results/first", str(tmp_path / "next")
+    )
+    assert room.process.asked == [("start", question)]
+    room.found(result_of_case("effect"))
+    assert not room.person.sees("Answer with the follow-up")
+
+
+def _kept(path, content):
+    path.write_bytes(content)
+    return path
+
+
+def test_a_diagnosis_with_a_follow_up_names_it_and_is_none_to_resume(tmp_path):
+    process = diagnosis(tmp_path, "time.sleep(60)")
+    process.start(Question("trefoil_1", given="results/first", follow_up="results/second/next"))
+    wait_for(lambda: process.status().done == 3)
+    process.queue(Question("trefoil_1", follow_up="results/third/next"))
+    assert process.waiting() == ("trefoil_1, with its follow-up",)
+    process.clear_queue()
+    process.cancel()
+    wait_for(lambda: not process.status().alive)
+    folder = only_folder(tmp_path)
+    assert folder.name.startswith("trefoil_1-followed-")
+    arguments = json.loads((folder / "arguments.json").read_text())
+    assert arguments[arguments.index("--follow-up") + 1] == "results/second/next"
+    assert arguments[arguments.index("--given") + 1] == "results/first"
     assert process.stopped(Question("trefoil_1")) is None
 
 

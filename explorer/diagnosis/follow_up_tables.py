@@ -1,0 +1,259 @@
+"""The tables of a follow-up (`next_folder`) by quantity and pour, as a person fills them in, and back.
+
+In the files a row that was not measured is a comment, since a reader refuses a row without a value; here it is a row
+like any other, its values empty. Lines of comments and observables that were not asked for stay as they are.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import zipfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from doe.diagnose.result import Suggestion
+from doe.errors import MeasurementError
+from doe.measurement.bodies import COLUMNS as BODY_COLUMNS
+from doe.measurement.bodies import QUANTITIES
+from doe.measurement.load import FILE, outside_files
+from doe.measurement.long_form import COLUMNS, MOST_BYTES
+from doe.measurement.scans import ARRAYS, IMAGES, POINTS, SURFACES
+from doe.table_file import DELIMITERS, CellTable, csv_table, read_text
+from explorer.diagnosis.next_folder import ORDER, asks_for
+from explorer.errors import CommandError
+from explorer.files.measured_curves import PICTURES
+from explorer.files.output_file import write_whole, write_whole_bytes
+from explorer.files.uploads import unpacked_folder
+from solver import named, parse_quantity, read_toml
+from solver.assets import own_path
+
+SCANNED = (*SURFACES, *POINTS, *ARRAYS, *IMAGES)
+"""What the name of a scan's file may end in."""
+ANY_DELIMITER = re.compile(f"[{''.join(DELIMITERS)}]")
+
+
+@dataclass(frozen=True)
+class AskedNumber:
+    """A quantity at the place ``x`` ("" for a scalar), and its value in every pour; "" where none is filled in."""
+
+    observable: str
+    x: str
+    values: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class AskedBody:
+    """A number of single bodies, its mean and standard error; "" where none is filled in."""
+
+    body: str
+    quantity: str
+    unit: str
+    mean: str
+    standard_error: str
+
+
+@dataclass(frozen=True)
+class FollowUpTables:
+    """What the follow-up in ``folder`` asks for in its one condition, and what is filled in."""
+
+    folder: Path
+    condition: str
+    numbers: tuple[AskedNumber, ...]
+    bodies: tuple[AskedBody, ...]
+    scans: int
+    """How many piles there is a scan of."""
+
+    @property
+    def pours(self) -> int:
+        """How many are asked for."""
+        return len(self.numbers[0].values) if self.numbers else 0
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Every value that is asked for, pours first."""
+        numbers = (value for row in self.numbers for value in row.values)
+        return (*numbers, *(cell for row in self.bodies for cell in (row.mean, row.standard_error)))
+
+
+def read_follow_up(folder: Path) -> FollowUpTables:
+    """The tables in ``folder``. Raises CommandError or MeasurementError, in one line, where they are none."""
+    pours, bodies = _files(folder)
+    of_pours = _table(pours, COLUMNS, _is_number)
+    found: dict[tuple[str, str], dict[int, str]] = {}
+    most = 0
+    for _, cells in of_pours.rows[1:]:
+        if _is_number(cells):
+            place = of_pours.plain(cells[2]) if len(cells) > 2 else ""
+            unit = cells[4] if len(cells) > 4 and cells[3] else ""
+            value = of_pours.plain(cells[3]) + unit if len(cells) > 3 else ""
+            found.setdefault((cells[1], place), {})[int(cells[0])] = value
+            most = max(most, int(cells[0]))
+    numbers = (AskedNumber(*key, tuple(of.get(k, "") for k in range(1, most + 1))) for key, of in found.items())
+    weighed: list[AskedBody] = []
+    if bodies is not None:
+        of_bodies = _table(bodies, BODY_COLUMNS, _is_body)
+        for _, cells in of_bodies.rows[1:]:
+            body, quantity, unit, mean, error = (*cells, "", "")[:5]
+            weighed.append(AskedBody(body, quantity, unit, of_bodies.plain(mean), of_bodies.plain(error)))
+    return FollowUpTables(folder, pours.stem, tuple(numbers), tuple(weighed), len(_scans(folder, pours.stem)))
+
+
+def write_numbers(folder: Path, numbers: Sequence[AskedNumber]) -> None:
+    """Write the values of ``numbers``, in SI, in place of those in the table of ``folder``.
+
+    A value is a number in SI, or one with a unit, as 24.7mm. Raises CommandError for another, with nothing changed.
+    """
+    path, _ = _files(folder)
+    entered: dict[tuple[str, str, int], str] = {}
+    for row in numbers:
+        known = named(row.observable)
+        for k, text in enumerate(row.values, start=1):
+            where = f"pour {k}, {row.observable}" + (f" at {row.x}" if row.x else "")
+            entered[row.observable, row.x, k] = _entered(text, known.unit if known else "1", where)
+    table = _table(path, COLUMNS, _is_number)
+
+    def line(cells: Sequence[str]) -> str:
+        if not _is_number(cells):
+            return ",".join(table.plain(cell) for cell in cells)
+        place = table.plain(cells[2]) if len(cells) > 2 else ""
+        value = entered.get((cells[1], place, int(cells[0])), "")
+        return f"{'' if value else '# '}{cells[0]},{cells[1]},{place},{value}"
+
+    _write(path, table, COLUMNS, line)
+
+
+def write_bodies(folder: Path, bodies: Sequence[AskedBody]) -> None:
+    """The same of the table of single bodies: means and standard errors in the units that it names."""
+    _, path = _files(folder)
+    if path is None:
+        raise CommandError(f"{folder / FILE}: bodies: is missing; allowed: the name of a table")
+    entered: dict[tuple[str, str], tuple[str, str, str]] = {}
+    for row in bodies:
+        where = f"{row.body}, {row.quantity.replace('_', ' ')}"
+        mean, error = (_number(text, where) for text in (row.mean, row.standard_error))
+        if bool(mean) != bool(error):
+            raise CommandError(f"{where}: has {'no standard error' if mean else 'no mean'}; allowed: both, or neither")
+        entered[row.body, row.quantity] = row.unit, mean, error
+
+    def line(cells: Sequence[str]) -> str:
+        unit, mean, error = entered.get((cells[0], cells[1]), (cells[2], "", ""))
+        return f"{'' if mean else '# '}{cells[0]},{cells[1]},{unit},{mean},{error}"
+
+    _write(path, _table(path, BODY_COLUMNS, _is_body), BODY_COLUMNS, line)
+
+
+def add_scan(folder: Path, name: str, content: bytes) -> Path:
+    """Keep ``content``, a scan that a browser sent as ``name``, as that of the first pile which has none yet."""
+    suffix = Path(name).suffix.lower()
+    if suffix not in SCANNED:
+        raise CommandError(f"{name[:80]}: allowed: files ending in {', '.join(SCANNED)}")
+    tables = read_follow_up(folder)
+    taken = {int(file.stem.rpartition("_")[2]) for file in _scans(folder, tables.condition)}
+    free = next((k for k in range(1, tables.pours + 1) if k not in taken), None)
+    if free is None:
+        raise CommandError(f"{name[:80]}: there is a scan of every pile ({tables.pours}); upload the whole folder anew")
+    path = folder / "scans" / f"{tables.condition}_{free}{suffix}"
+    path.parent.mkdir(exist_ok=True)
+    write_whole_bytes(path, content)
+    return path
+
+
+def packed(folder: Path) -> bytes:
+    """The whole folder as an archive (.zip), to be filled in elsewhere."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for file in sorted(file for file in folder.rglob("*") if file.is_file()):
+            archive.write(file, file.relative_to(folder).as_posix())
+    return content.getvalue()
+
+
+def take_filled(folder: Path, suggestion: Suggestion, name: str, content: bytes, uploads: Path) -> None:
+    """Take what was measured from the archive ``content``, this follow-up filled in elsewhere; kept in ``uploads`` too.
+
+    Of its files these are taken: tables, scans, pictures, and the settings in measurement.toml. Raises CommandError in
+    one line, with nothing changed, for an archive of something else, or settings that name a file outside it.
+    """
+
+    def read(unpacked: Path) -> None:
+        if not asks_for(unpacked, suggestion):
+            raise CommandError(f"{ORDER}: is that of another follow-up; allowed: of {suggestion.experiment.name}")
+        if not (unpacked / FILE).is_file():
+            raise CommandError(f"{FILE}: is missing")
+        if (unpacked / FILE).read_bytes() != (folder / FILE).read_bytes():
+            for key, path in outside_files(unpacked, read_toml(unpacked / FILE)):
+                raise CommandError(f"{key}: {path.name[:80]!r} is outside the archive; allowed are files in it")
+        read_follow_up(unpacked)
+
+    sent = unpacked_folder(name, content, uploads, ORDER, read)
+    tables = [file for file in _files(sent) if file is not None]
+    for file in sorted(file for file in sent.rglob("*") if file.is_file()):
+        if file.suffix.lower() in (*SCANNED, *PICTURES) or file in (sent / FILE, *tables):
+            to = folder / file.relative_to(sent)
+            to.parent.mkdir(parents=True, exist_ok=True)
+            write_whole_bytes(to, file.read_bytes())
+
+
+# The files
+
+
+def _files(folder: Path) -> tuple[Path, Path | None]:
+    """The table of the one condition, and that of single bodies if there is one."""
+    table = read_toml(folder / FILE)
+    conditions = table.get("condition")
+    if not isinstance(conditions, list) or len(conditions) != 1 or "data" not in conditions[0]:
+        raise CommandError(f"{folder / FILE}: condition: allowed: one, with its table under data")
+    bodies = table.get("bodies")
+    return folder / own_path(str(conditions[0]["data"])), None if bodies is None else folder / own_path(str(bodies))
+
+
+def _scans(folder: Path, condition: str) -> list[Path]:
+    numbered = re.compile(rf"{re.escape(condition)}_\d+")
+    scans = folder / "scans"
+    files = sorted(scans.iterdir()) if scans.is_dir() else []
+    return [file for file in files if numbered.fullmatch(file.stem) and file.suffix.lower() in SCANNED]
+
+
+def _table(path: Path, columns: Sequence[str], is_row: Callable[[Sequence[str]], bool]) -> CellTable:
+    """The table in ``path``, the rows that were not measured among the others."""
+    lines = []
+    for line in read_text(path, MOST_BYTES, MeasurementError).splitlines():
+        bare = line.strip().strip('"').lstrip("# ") if line.lstrip(' "').startswith("#") else ""
+        lines.append(bare if bare and is_row([cell.strip() for cell in ANY_DELIMITER.split(bare)]) else line)
+    table = csv_table("\n".join(lines), lambda line, what: MeasurementError(f"{path}:{line}: {what}"), True)
+    header = table.rows[0][1] if table.rows else []
+    if [*header[: len(columns)]] != [*columns]:
+        found = ",".join(header) or "nothing"
+        raise CommandError(f"{path}: columns: {found[:80]}; allowed here: {','.join(columns)}")
+    return table
+
+
+def _is_number(cells: Sequence[str]) -> bool:
+    return len(cells) > 2 and cells[0].isdecimal() and named(cells[1]) is not None
+
+
+def _is_body(cells: Sequence[str]) -> bool:
+    return len(cells) > 2 and cells[1] in QUANTITIES
+
+
+def _entered(text: str, unit: str, where: str) -> str:
+    """A value as it was typed, in SI; "" for none. ParameterError where it is no number of that unit."""
+    plain = _with_point(text)
+    return repr(parse_quantity(plain, unit, where)) if plain else ""
+
+
+def _number(text: str, where: str) -> str:
+    plain = _with_point(text)
+    return repr(parse_quantity(plain, "1", where)) if plain else ""
+
+
+def _with_point(text: str) -> str:
+    plain = "".join(text.split()).replace("−", "-")
+    return plain if "." in plain else plain.replace(",", ".")
+
+
+def _write(path: Path, table: CellTable, columns: Sequence[str], line: Callable[[Sequence[str]], str]) -> None:
+    """Comments, header and rows in their order, each row as ``line`` says."""
+    lines = [text for _, text in table.comments] + [",".join(columns)]
+    write_whole(path, "\n".join([*lines, *(line(cells) for _, cells in table.rows[1:])]) + "\n")
