@@ -14,14 +14,7 @@ from doe.declared.model import Declared, declare
 from doe.declared.pours import ROOT, ModelPours, OnPour
 from doe.diagnose.candidate_experiments import CandidateExperiments, next_experiment
 from doe.diagnose.compared_features import Compared, measured, weighed
-from doe.diagnose.confirm import (
-    CONTRADICTED,
-    Confirmed,
-    confirm,
-    held_out,
-    model_of,
-    residual_maps,
-)
+from doe.diagnose.confirm import CONTRADICTED, Confirmed, confirm, held_out, model_of, residual_maps
 from doe.diagnose.posterior import Posterior, gain_by_pours, holds
 from doe.diagnose.result import NO_EFFECT, HeldOut, Level, Offered, Suggestion
 from doe.diagnose.training_pours import Say, TrainingPours
@@ -229,10 +222,12 @@ def concluded(
         asked, pours, fresh_pours(conditions), [len(summary_names(condition)) for condition in conditions]
     )
     before, after = confirmed[0], confirmed[-1]
-    told = held_out_of(conditions, verdict.final, after)
-    if told is not None and told.p < CONTRADICTED and (verdict.names or verdict.kind == NO_EFFECT):
-        why = f"{told.summary} of {told.condition} is {told.farthest:.1f} standard errors off"
-        verdict = taken_back(verdict, why)
+    places = [c for c, condition in enumerate(conditions) if condition.role == "holdout"]
+    data = [replicates_of(conditions[c]) for c in places]
+    fit = 1.0 if verdict.kind.startswith("ambiguous") else fits[verdict.final].p
+    told = held_out(verdict.final, data, [after.blocks[c] for c in places], fit)
+    if told is not None and told.together < CONTRADICTED and (verdict.names or verdict.kind == NO_EFFECT):
+        verdict = taken_back(verdict, f"{told.summary} of {told.condition} is {told.farthest:.1f} standard errors off")
         say(f"with held-out data: {verdict.kind}")
     return Conclusion(before, after, told), verdict
 
@@ -272,12 +267,6 @@ def offered(condition: Condition, c: int, compared: Compared) -> Offered:
     names = feature_set(condition)
     data = measured(condition)
     return Offered(condition.name, data.offer, len(compared.names[c]), names.offered(SCAN) - len(data.names))
-
-
-def held_out_of(conditions: Sequence[Condition], label: str, final: Confirmed) -> HeldOut | None:
-    """What those of ``conditions`` that are held out say of the final model."""
-    places = [c for c, condition in enumerate(conditions) if condition.role == "holdout"]
-    return held_out(label, [replicates_of(conditions[c]) for c in places], [final.blocks[c] for c in places])
 
 
 def replicates_of(condition: Condition) -> MeasuredReplicates:

@@ -48,7 +48,10 @@ class Probabilities(Record):
 
 @dataclass(frozen=True)
 class Rule(Record):
-    """Constants of the rule that the report tells (`doe.diagnose`); ``doubted``: 1 in results from before it."""
+    """Constants of the rule that the report tells (`doe.diagnose`); ``doubted``: 1 in results from before it.
+
+    ``together``: whether ``contradicted`` is of fitted and held-out data together; of the latter alone before.
+    """
 
     prior_nothing: float
     prior_outside: float
@@ -60,6 +63,7 @@ class Rule(Record):
     contradicted: float
     strong: float
     doubted: float = 1.0
+    together: bool = False
 
 
 @dataclass(frozen=True)

@@ -70,6 +70,7 @@ RULE = Rule(
     contradicted=CONTRADICTED,
     strong=STRONG,
     doubted=DOUBTED,
+    together=True,
 )
 
 

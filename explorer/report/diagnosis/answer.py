@@ -25,6 +25,7 @@ from explorer.report.diagnosis.wording import (
     share_of_bound,
     size_text,
     spelled,
+    with_fit,
 )
 from explorer.units import MISSING, code, counted, enumeration, fixed, p_value, percent, signed
 from solver.effects import EFFECTS, Stage
@@ -289,8 +290,8 @@ def _taken_back(result: DiagnosisResult, told: HeldOut) -> str:
         f"The fitted data give {first}, but the held-out data contradict it, so it is taken back: "
         f"{feature_label(told.summary)} of condition {told.condition} is {fixed(told.farthest, 1)} standard "
         f"errors from fresh pours of {model_words(told.label)} (p = {p_value(told.p)}, corrected for the number "
-        "of summaries). The answer is that something is missing or wrong that none of the effects explains in all "
-        f"conditions. {confirmation_sentence(result) if result.added else ''}".rstrip()
+        f"of summaries{with_fit(told)}). The answer is that something is missing or wrong that none of the effects "
+        f"explains in all conditions. {confirmation_sentence(result) if result.added else ''}".rstrip()
     )
 
 

@@ -16,6 +16,7 @@ from explorer.report.diagnosis.wording import (
     feature_value,
     model_words,
     spelled,
+    with_fit,
 )
 from explorer.units import code, counted, duration, enumeration, fixed, number, p_value, parameter_label, percent
 
@@ -137,7 +138,7 @@ def _result(result: DiagnosisResult) -> str:
     if result.taken_back and told is not None:
         sentence += (
             f" The held-out data contradicted that answer ({feature_label(told.summary)} in {told.condition}, "
-            f"p = {p_value(told.p)}), and it was withdrawn."
+            f"p = {p_value(told.p)}{with_fit(told)}), and it was withdrawn."
         )
     return sentence
 
@@ -152,6 +153,12 @@ def how_reached(result: DiagnosisResult) -> Section:
     rule = {name: number(value) for name, value in vars(result.rule).items()}
     # A result from before this condition was judged without it.
     doubted = f", and unlikely under the declared model (p < {rule['doubted']})" if result.rule.doubted < 1.0 else ""
+    taken = f"answer back where a summary contradicts it at p < {rule['contradicted']}, corrected for their number."
+    if result.rule.together:
+        taken = (
+            "answer back where fitted and held-out data together (Fisher; the farthest held-out summary, corrected for "
+            f"their number) are as far off it as in less than {percent(result.rule.contradicted)} of cases."
+        )
     features = sum(row.features for row in result.offered)
     lines = (
         f"The same {features} features are read from measured and simulated piles. Their far tails are drawn in, and "
@@ -173,7 +180,7 @@ def how_reached(result: DiagnosisResult) -> Section:
         "probable, and ambiguous otherwise: the smallest set of answers that holds "
         f"{percent(result.rule.credible)}.",
         "Fresh pours of the declared and the final model give the errors. Held-out data never choose; they take an "
-        f"answer back where a summary contradicts it at p < {rule['contradicted']}, corrected for their number.",
+        + taken,
     )
     blocks: list[Block] = [Bullets(lines)]
     told = result.held_out
@@ -182,7 +189,7 @@ def how_reached(result: DiagnosisResult) -> Section:
             Text(
                 f"Held-out data: farthest from fresh pours of {model_words(told.label)} is "
                 f"{feature_label(told.summary)} of {told.condition}, by {fixed(told.farthest, 1)} "
-                f"standard errors, p = {p_value(told.p)}."
+                f"standard errors, p = {p_value(told.p)}{with_fit(told)}."
             )
         )
     return Section("How the answer was reached", tuple(blocks))

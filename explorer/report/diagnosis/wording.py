@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-from doe.diagnose.result import BASE, NO_EFFECT, UNEXPLAINED, Amplitude, EffectRow, Place
+from doe.diagnose.result import BASE, NO_EFFECT, UNEXPLAINED, Amplitude, EffectRow, HeldOut, Place
 from doe.holdout import OVERALL
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.units import (
@@ -18,6 +18,7 @@ from explorer.units import (
     ReadingUnit,
     code,
     number,
+    p_value,
     parameter_range,
     parameter_value,
     percent,
@@ -206,3 +207,8 @@ SURFACE_UNITS = {
     "_m": ReadingUnit("mm", 1e-3),
 }
 """By the ending of a name."""
+
+
+def with_fit(told: HeldOut) -> str:
+    """What the fitted data add to p of the held-out data."""
+    return "" if told.fit == 1.0 else f"; with that of the fitted data, {p_value(told.fit)}, {p_value(told.together)}"

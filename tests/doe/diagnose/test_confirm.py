@@ -10,7 +10,7 @@ from scipy import stats
 
 from doe.declared.model import CalibratedParameter, CandidateEffect, Declared
 from doe.diagnose.confirm import CONTRADICTED, Confirmed, confirming, held_out, model_of, residual_maps
-from doe.diagnose.result import Amplitude, CalibratedModel
+from doe.diagnose.result import Amplitude, CalibratedModel, HeldOut
 from doe.holdout import MeasuredReplicates
 from doe.measurement import load_measurement
 from doe.measurement.piles import PileSurface
@@ -170,3 +170,21 @@ def test_a_right_model_is_seldom_contradicted_by_single_readings():
             below += found.p < 0.1
         # Three binomial standard errors; Welch and Satterthwaite are approximate within that.
         assert below / 2000 == pytest.approx(0.1, abs=0.02)
+
+
+@pytest.mark.parametrize("fit", [1.0, 0.3, 0.02])
+def test_fitted_and_held_out_data_speak_together_as_fisher_says(fit):
+    one = MeasuredReplicates("holdout", ("a",), np.array([[2.0], [2.5], [3.0]]), np.zeros(1))
+    found = held_out("base", [one], [np.linspace(0.0, 2.0, 8)[:, None]], fit)
+    assert found.together == pytest.approx(stats.combine_pvalues([found.p, fit], method="fisher").pvalue)
+
+
+def test_a_model_that_is_somewhat_off_in_both_is_contradicted_and_one_that_is_off_in_one_is_not():
+    off = HeldOut("plastic_contact", "holdout", "apex_height_m", 5.0, 0.005)
+    assert replace(off, fit=0.05).together < CONTRADICTED < off.together
+    assert replace(off, p=1.0, fit=0.01).together > CONTRADICTED
+    assert replace(off, p=0.0).together == 0.0
+    # The chance that a right model is taken back, of as many data sets as there are in a whole test.
+    p, fit = np.random.default_rng(5).uniform(size=(2, 100_000))
+    share = np.mean([replace(off, p=a, fit=b).together < CONTRADICTED for a, b in zip(p, fit, strict=True)])
+    assert share == pytest.approx(CONTRADICTED, abs=4.0 * np.sqrt(CONTRADICTED / 100_000))
