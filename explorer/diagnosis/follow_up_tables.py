@@ -25,12 +25,15 @@ from explorer.diagnosis.next_folder import ORDER, asks_for
 from explorer.errors import CommandError
 from explorer.files.measured_curves import PICTURES
 from explorer.files.output_file import write_whole, write_whole_bytes
+from explorer.files.uploads import named as whose
 from explorer.files.uploads import unpacked_folder
 from solver import named, parse_quantity, read_toml
 from solver.assets import own_path
 
 SCANNED = (*SURFACES, *POINTS, *ARRAYS, *IMAGES)
 """What the name of a scan's file may end in."""
+KEPT = "follow_ups"
+"""Folder among the uploads for those that were sent back: they are no data sets of their own."""
 ANY_DELIMITER = re.compile(f"[{''.join(DELIMITERS)}]")
 
 
@@ -97,7 +100,8 @@ def read_follow_up(folder: Path) -> FollowUpTables:
         for _, cells in of_bodies.rows[1:]:
             body, quantity, unit, mean, error = (*cells, "", "")[:5]
             weighed.append(AskedBody(body, quantity, unit, of_bodies.plain(mean), of_bodies.plain(error)))
-    return FollowUpTables(folder, pours.stem, tuple(numbers), tuple(weighed), len(_scans(folder, pours.stem)))
+    name = _condition(folder)["name"]
+    return FollowUpTables(folder, name, tuple(numbers), tuple(weighed), len(_scans(folder, name)))
 
 
 def write_numbers(folder: Path, numbers: Sequence[AskedNumber]) -> None:
@@ -176,17 +180,14 @@ def take_filled(folder: Path, suggestion: Suggestion, name: str, content: bytes,
     one line, with nothing changed, for an archive of something else, or settings that name a file outside it.
     """
 
-    def read(unpacked: Path) -> None:
-        if not asks_for(unpacked, suggestion):
+    sent = unpacked_folder(name, content, uploads / KEPT, ORDER, read_follow_up)
+    # The same archive may have been sent to another follow-up before.
+    with whose(name, sent):
+        if not asks_for(sent, suggestion):
             raise CommandError(f"{ORDER}: is that of another follow-up; allowed: of {suggestion.experiment.name}")
-        if not (unpacked / FILE).is_file():
-            raise CommandError(f"{FILE}: is missing")
-        if (unpacked / FILE).read_bytes() != (folder / FILE).read_bytes():
-            for key, path in outside_files(unpacked, read_toml(unpacked / FILE)):
+        if (sent / FILE).read_bytes() != (folder / FILE).read_bytes():
+            for key, path in outside_files(sent, read_toml(sent / FILE)):
                 raise CommandError(f"{key}: {path.name[:80]!r} is outside the archive; allowed are files in it")
-        read_follow_up(unpacked)
-
-    sent = unpacked_folder(name, content, uploads, ORDER, read)
     tables = [file for file in _files(sent) if file is not None]
     for file in sorted(file for file in sent.rglob("*") if file.is_file()):
         if file.suffix.lower() in (*SCANNED, *PICTURES) or file in (sent / FILE, *tables):
@@ -200,12 +201,17 @@ def take_filled(folder: Path, suggestion: Suggestion, name: str, content: bytes,
 
 def _files(folder: Path) -> tuple[Path, Path | None]:
     """The table of the one condition, and that of single bodies if there is one."""
-    table = read_toml(folder / FILE)
-    conditions = table.get("condition")
-    if not isinstance(conditions, list) or len(conditions) != 1 or "data" not in conditions[0]:
-        raise CommandError(f"{folder / FILE}: condition: allowed: one, with its table under data")
-    bodies = table.get("bodies")
-    return folder / own_path(str(conditions[0]["data"])), None if bodies is None else folder / own_path(str(bodies))
+    bodies = read_toml(folder / FILE).get("bodies")
+    return folder / own_path(_condition(folder)["data"]), None if bodies is None else folder / own_path(str(bodies))
+
+
+def _condition(folder: Path) -> dict[str, str]:
+    """Name and table of the one condition."""
+    conditions = read_toml(folder / FILE).get("condition")
+    one = conditions[0] if isinstance(conditions, list) and len(conditions) == 1 else None
+    if not isinstance(one, dict) or not {"name", "data"} <= set(one):
+        raise CommandError(f"{folder / FILE}: condition: allowed: one, with its name and its table under data")
+    return {key: str(one[key]) for key in ("name", "data")}
 
 
 def _scans(folder: Path, condition: str) -> list[Path]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -423,7 +424,11 @@ class FollowUp:
 
 def _written(folder: Path) -> tuple[int, ...]:
     """When tables and scans in ``folder`` were written."""
-    return tuple(file.stat().st_mtime_ns for file in sorted((*folder.iterdir(), *folder.glob("scans/*"))))
+    written = []
+    for file in sorted((*folder.iterdir(), *folder.glob("scans/*"))):
+        with suppress(FileNotFoundError):  # another program may be at work in it
+            written.append(file.stat().st_mtime_ns)
+    return tuple(written)
 
 
 def _follow_up_markdown(result: DiagnosisResult, folder: Path) -> str:

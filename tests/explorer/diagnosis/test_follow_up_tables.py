@@ -20,6 +20,7 @@ from explorer.diagnosis.follow_up_tables import (
 )
 from explorer.diagnosis.next_folder import read_next, write_next
 from explorer.errors import CommandError
+from explorer.files.uploads import kept_measurements
 from explorer.viewer.tables.follow_up_page import (
     body_columns,
     body_rows,
@@ -219,8 +220,17 @@ def test_an_archive_of_something_else_is_refused_with_nothing_changed(folder, as
     without = (folder / "measurement.toml").rename(tmp_path / "measurement.toml")
     sent = packed(folder)
     without.rename(folder / "measurement.toml")
-    assert refused(sent) == "back.zip: measurement.toml: is missing"
+    assert re.fullmatch(r"back\.zip: measurement\.toml: no such file.*", refused(sent))
     assert "columns: a,b" in refused(archive_of(folder, **{table(folder).name: "a,b\n1,2\n"}))
+
+
+def test_an_archive_that_was_another_follow_up_s_is_refused_and_none_is_a_data_set(folder, asked, tmp_path):
+    uploads, before = tmp_path / "uploads", contents(folder)
+    take_filled(folder, asked, "back.zip", packed(folder), uploads)
+    with pytest.raises(CommandError, match=r"^back\.zip: follow_up\.json: is that of another follow-up"):
+        take_filled(folder, replace(asked, rivals=("air_drag", "base")), "back.zip", packed(folder), uploads)
+    assert contents(folder) == before
+    assert kept_measurements(uploads) == {}
 
 
 # On the page
