@@ -102,6 +102,19 @@ def positions(page):
     return np.array(page.evaluate(POSITIONS)).reshape(-1, 3)
 
 
+def still(page):
+    """Positions once they stand still: frames that were on their way have come."""
+    reads = [positions(page)]
+
+    def same():
+        time.sleep(1.0)
+        reads.append(positions(page))
+        return np.array_equal(*reads[-2:])
+
+    wait_for(same)
+    return reads[-1]
+
+
 def simulated_time(page):
     """The solver's time as the timeline shows it [s]."""
     return float(page.locator("#timeline .time").inner_text().split()[0])
@@ -138,10 +151,7 @@ def to_its_end(page, label, key, said):
 def test_friction_taken_away_by_mouse_lets_a_resting_pile_flow(page):
     wait_for(lambda: state(page) == "ended")
     assert "at rest" in page.locator("#timeline .chip").inner_text()
-    time.sleep(1.0)
-    resting = positions(page)
-    time.sleep(1.0)
-    np.testing.assert_array_equal(positions(page), resting)
+    resting = still(page)
     assert resting[:, 2].max() > 0.01
 
     thumb = slider(page, "Static friction")
@@ -166,10 +176,9 @@ def test_space_pauses_and_plays_and_the_arrow_steps(page):
     wait_for(lambda: state(page) == "running")
     page.keyboard.press("Space")
     wait_for(lambda: state(page) == "paused")
+    standing, paused_at = still(page), simulated_time(page)
     time.sleep(1.0)
-    still, paused_at = positions(page), simulated_time(page)
-    time.sleep(1.0)
-    np.testing.assert_array_equal(positions(page), still)
+    np.testing.assert_array_equal(positions(page), standing)
     assert simulated_time(page) == paused_at
 
     # 10 ms, which a busy machine simulates in parts and shows part by part; the page shows milliseconds.
@@ -182,7 +191,7 @@ def test_space_pauses_and_plays_and_the_arrow_steps(page):
     page.keyboard.press("Space")
     wait_for(lambda: state(page) == "running")
     wait_for(lambda: simulated_time(page) > paused_at + 0.05)
-    assert (positions(page) != still).any()
+    wait_for(lambda: (positions(page) != standing).any())
 
 
 def settled(page):

@@ -1,7 +1,6 @@
 """Changing, undoing and taking along in headless Chromium: what only a browser can show."""
 
 import re
-import time
 import zipfile
 
 import numpy as np
@@ -18,6 +17,7 @@ from tests.browser.test_page import (
     simulated_time,
     slider,
     state,
+    still,
     to_its_end,
     unfold,
     wait_for,
@@ -53,8 +53,7 @@ def press(page, key):
 def test_a_slider_moved_by_key_is_undone_and_made_again(page):
     wait_for(lambda: state(page) == "ended")
     page.get_by_text(DECLARED).wait_for()
-    time.sleep(1.0)
-    resting = positions(page)
+    resting = still(page)
     slider(page, "Static friction").scroll_into_view_if_needed()
     to_its_end(page, "Static friction", "Home", NONE)
     # Nothing holds the pile any more: the bodies slide by more than half a seed's thickness.
