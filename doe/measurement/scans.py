@@ -32,6 +32,8 @@ Array = npt.NDArray[np.float64]
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 SURFACES, POINTS, ARRAYS, IMAGES = (".ply", ".stl"), (".xyz", ".txt", ".csv"), (".npz",), (".tif", ".tiff")
+SUFFIXES = (*SURFACES, *POINTS, *ARRAYS, *IMAGES)
+"""What the name of a scan's file may end in."""
 AXIS_ERROR = 1.5e-3
 """How well [m] a rig's axis is found in the coordinates of a scanner, where nothing is stated: a plumb bob's tip."""
 MOST_BYTES = 300_000_000
@@ -131,7 +133,7 @@ def scan_files(folder: Path, conditions: Iterable[str]) -> tuple[dict[str, dict[
     strangers = []
     for path in sorted((folder / "scans").glob("*")):
         name, _, replicate = path.stem.rpartition("_")
-        known = path.suffix.lower() in SURFACES + POINTS + ARRAYS + IMAGES
+        known = path.suffix.lower() in SUFFIXES
         if known and name in found and replicate.isdecimal() and int(replicate) >= 1:
             if int(replicate) in found[name]:
                 raise MeasurementError(f"{path}: replicate {replicate} has more than one scan; allowed: one file")

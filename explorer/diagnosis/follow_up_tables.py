@@ -6,9 +6,7 @@ like any other, its values empty. Lines of comments and observables that were no
 
 from __future__ import annotations
 
-import io
 import re
-import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,10 +17,11 @@ from doe.measurement.bodies import COLUMNS as BODY_COLUMNS
 from doe.measurement.bodies import QUANTITIES
 from doe.measurement.load import FILE, outside_files
 from doe.measurement.long_form import COLUMNS, MOST_BYTES
-from doe.measurement.scans import ARRAYS, IMAGES, POINTS, SURFACES
+from doe.measurement.scans import SUFFIXES, scan_files
 from doe.table_file import DELIMITERS, CellTable, csv_table, read_text
 from explorer.diagnosis.next_folder import ORDER, asks_for
 from explorer.errors import CommandError
+from explorer.files.exports import zipped
 from explorer.files.measured_curves import PICTURES
 from explorer.files.output_file import write_whole, write_whole_bytes
 from explorer.files.uploads import named as whose
@@ -30,8 +29,6 @@ from explorer.files.uploads import unpacked_folder
 from solver import named, parse_quantity, read_toml
 from solver.assets import own_path
 
-SCANNED = (*SURFACES, *POINTS, *ARRAYS, *IMAGES)
-"""What the name of a scan's file may end in."""
 KEPT = "follow_ups"
 """Folder among the uploads for those that were sent back: they are no data sets of their own."""
 ANY_DELIMITER = re.compile(f"[{''.join(DELIMITERS)}]")
@@ -65,8 +62,8 @@ class FollowUpTables:
     condition: str
     numbers: tuple[AskedNumber, ...]
     bodies: tuple[AskedBody, ...]
-    scans: int
-    """How many piles there is a scan of."""
+    scanned: frozenset[int]
+    """Pours of whose pile there is a scan."""
 
     @property
     def pours(self) -> int:
@@ -82,7 +79,7 @@ class FollowUpTables:
 
 def read_follow_up(folder: Path) -> FollowUpTables:
     """The tables in ``folder``. Raises CommandError or MeasurementError, in one line, where they are none."""
-    pours, bodies = _files(folder)
+    name, pours, bodies = _files(folder)
     of_pours = _table(pours, COLUMNS, _is_number)
     found: dict[tuple[str, str], dict[int, str]] = {}
     most = 0
@@ -100,8 +97,8 @@ def read_follow_up(folder: Path) -> FollowUpTables:
         for _, cells in of_bodies.rows[1:]:
             body, quantity, unit, mean, error = (*cells, "", "")[:5]
             weighed.append(AskedBody(body, quantity, unit, of_bodies.plain(mean), of_bodies.plain(error)))
-    name = _condition(folder)["name"]
-    return FollowUpTables(folder, name, tuple(numbers), tuple(weighed), len(_scans(folder, name)))
+    scans = scan_files(folder, [name])[0][name]
+    return FollowUpTables(folder, name, tuple(numbers), tuple(weighed), frozenset(scans))
 
 
 def write_numbers(folder: Path, numbers: Sequence[AskedNumber]) -> None:
@@ -109,7 +106,7 @@ def write_numbers(folder: Path, numbers: Sequence[AskedNumber]) -> None:
 
     A value is a number in SI, or one with a unit, as 24.7mm. Raises CommandError for another, with nothing changed.
     """
-    path, _ = _files(folder)
+    _, path, _ = _files(folder)
     entered: dict[tuple[str, str, int], str] = {}
     for row in numbers:
         known = named(row.observable)
@@ -130,13 +127,13 @@ def write_numbers(folder: Path, numbers: Sequence[AskedNumber]) -> None:
 
 def write_bodies(folder: Path, bodies: Sequence[AskedBody]) -> None:
     """The same of the table of single bodies: means and standard errors in the units that it names."""
-    _, path = _files(folder)
+    _, _, path = _files(folder)
     if path is None:
         raise CommandError(f"{folder / FILE}: bodies: is missing; allowed: the name of a table")
     entered: dict[tuple[str, str], tuple[str, str, str]] = {}
     for row in bodies:
         where = f"{row.body}, {row.quantity.replace('_', ' ')}"
-        mean, error = (_number(text, where) for text in (row.mean, row.standard_error))
+        mean, error = (_entered(text, "1", where) for text in (row.mean, row.standard_error))
         if bool(mean) != bool(error):
             raise CommandError(f"{where}: has {'no standard error' if mean else 'no mean'}; allowed: both, or neither")
         entered[row.body, row.quantity] = row.unit, mean, error
@@ -151,11 +148,10 @@ def write_bodies(folder: Path, bodies: Sequence[AskedBody]) -> None:
 def add_scan(folder: Path, name: str, content: bytes) -> Path:
     """Keep ``content``, a scan that a browser sent as ``name``, as that of the first pile which has none yet."""
     suffix = Path(name).suffix.lower()
-    if suffix not in SCANNED:
-        raise CommandError(f"{name[:80]}: allowed: files ending in {', '.join(SCANNED)}")
+    if suffix not in SUFFIXES:
+        raise CommandError(f"{name[:80]}: allowed: files ending in {', '.join(SUFFIXES)}")
     tables = read_follow_up(folder)
-    taken = {int(file.stem.rpartition("_")[2]) for file in _scans(folder, tables.condition)}
-    free = next((k for k in range(1, tables.pours + 1) if k not in taken), None)
+    free = next((k for k in range(1, tables.pours + 1) if k not in tables.scanned), None)
     if free is None:
         raise CommandError(f"{name[:80]}: there is a scan of every pile ({tables.pours}); upload the whole folder anew")
     path = folder / "scans" / f"{tables.condition}_{free}{suffix}"
@@ -166,11 +162,8 @@ def add_scan(folder: Path, name: str, content: bytes) -> Path:
 
 def packed(folder: Path) -> bytes:
     """The whole folder as an archive (.zip), to be filled in elsewhere."""
-    content = io.BytesIO()
-    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
-        for file in sorted(file for file in folder.rglob("*") if file.is_file()):
-            archive.write(file, file.relative_to(folder).as_posix())
-    return content.getvalue()
+    files = sorted(file for file in folder.rglob("*") if file.is_file())
+    return zipped({file.relative_to(folder).as_posix(): file for file in files})
 
 
 def take_filled(folder: Path, suggestion: Suggestion, name: str, content: bytes, uploads: Path) -> None:
@@ -179,7 +172,6 @@ def take_filled(folder: Path, suggestion: Suggestion, name: str, content: bytes,
     Of its files these are taken: tables, scans, pictures, and the settings in measurement.toml. Raises CommandError in
     one line, with nothing changed, for an archive of something else, or settings that name a file outside it.
     """
-
     sent = unpacked_folder(name, content, uploads / KEPT, ORDER, read_follow_up)
     # The same archive may have been sent to another follow-up before.
     with whose(name, sent):
@@ -188,9 +180,9 @@ def take_filled(folder: Path, suggestion: Suggestion, name: str, content: bytes,
         if (sent / FILE).read_bytes() != (folder / FILE).read_bytes():
             for key, path in outside_files(sent, read_toml(sent / FILE)):
                 raise CommandError(f"{key}: {path.name[:80]!r} is outside the archive; allowed are files in it")
-    tables = [file for file in _files(sent) if file is not None]
+    _, *tables = _files(sent)
     for file in sorted(file for file in sent.rglob("*") if file.is_file()):
-        if file.suffix.lower() in (*SCANNED, *PICTURES) or file in (sent / FILE, *tables):
+        if file.suffix.lower() in (*SUFFIXES, *PICTURES) or file in (sent / FILE, *tables):
             to = folder / file.relative_to(sent)
             to.parent.mkdir(parents=True, exist_ok=True)
             write_whole_bytes(to, file.read_bytes())
@@ -199,26 +191,15 @@ def take_filled(folder: Path, suggestion: Suggestion, name: str, content: bytes,
 # The files
 
 
-def _files(folder: Path) -> tuple[Path, Path | None]:
-    """The table of the one condition, and that of single bodies if there is one."""
-    bodies = read_toml(folder / FILE).get("bodies")
-    return folder / own_path(_condition(folder)["data"]), None if bodies is None else folder / own_path(str(bodies))
-
-
-def _condition(folder: Path) -> dict[str, str]:
-    """Name and table of the one condition."""
-    conditions = read_toml(folder / FILE).get("condition")
+def _files(folder: Path) -> tuple[str, Path, Path | None]:
+    """Name and table of the one condition, and the table of single bodies if there is one."""
+    table = read_toml(folder / FILE)
+    conditions, bodies = table.get("condition"), table.get("bodies")
     one = conditions[0] if isinstance(conditions, list) and len(conditions) == 1 else None
     if not isinstance(one, dict) or not {"name", "data"} <= set(one):
         raise CommandError(f"{folder / FILE}: condition: allowed: one, with its name and its table under data")
-    return {key: str(one[key]) for key in ("name", "data")}
-
-
-def _scans(folder: Path, condition: str) -> list[Path]:
-    numbered = re.compile(rf"{re.escape(condition)}_\d+")
-    scans = folder / "scans"
-    files = sorted(scans.iterdir()) if scans.is_dir() else []
-    return [file for file in files if numbered.fullmatch(file.stem) and file.suffix.lower() in SCANNED]
+    pours = folder / own_path(str(one["data"]))
+    return str(one["name"]), pours, None if bodies is None else folder / own_path(str(bodies))
 
 
 def _table(path: Path, columns: Sequence[str], is_row: Callable[[Sequence[str]], bool]) -> CellTable:
@@ -245,18 +226,9 @@ def _is_body(cells: Sequence[str]) -> bool:
 
 def _entered(text: str, unit: str, where: str) -> str:
     """A value as it was typed, in SI; "" for none. ParameterError where it is no number of that unit."""
-    plain = _with_point(text)
-    return repr(parse_quantity(plain, unit, where)) if plain else ""
-
-
-def _number(text: str, where: str) -> str:
-    plain = _with_point(text)
-    return repr(parse_quantity(plain, "1", where)) if plain else ""
-
-
-def _with_point(text: str) -> str:
     plain = "".join(text.split()).replace("−", "-")
-    return plain if "." in plain else plain.replace(",", ".")
+    plain = plain if "." in plain else plain.replace(",", ".")
+    return repr(parse_quantity(plain, unit, where)) if plain else ""
 
 
 def _write(path: Path, table: CellTable, columns: Sequence[str], line: Callable[[Sequence[str]], str]) -> None:

@@ -1,5 +1,7 @@
 """A finished diagnosis in headless Chromium: the real answer of `examples/trefoil_2`, and its piles side by side."""
 
+from contextlib import contextmanager
+
 import pytest
 
 from explorer import load_diagnosis
@@ -11,11 +13,9 @@ pytestmark = pytest.mark.browser
 NODES = "() => Object.keys(window.__viserSceneTree.getState())"
 
 
-@pytest.fixture(scope="module")
-def page(browser, tmp_path_factory):
-    """The room *Diagnose* of a person who has that diagnosis."""
-    data = tmp_path_factory.mktemp("data")
-    diagnosed(data)
+@contextmanager
+def diagnose_room(browser, data):
+    """The room *Diagnose* of a person who has ``data``."""
     with served("--store", data / "runs.sqlite", *SETTINGS, data=data, patience=30) as address:
         page = browser.new_page(viewport={"width": 1280, "height": 1400})
         page.set_default_timeout(PATIENCE)
@@ -24,6 +24,15 @@ def page(browser, tmp_path_factory):
         room(page, "Diagnose")
         yield page
         page.close()
+
+
+@pytest.fixture(scope="module")
+def page(browser, tmp_path_factory):
+    """That of a person who has the finished diagnosis."""
+    data = tmp_path_factory.mktemp("data")
+    diagnosed(data)
+    with diagnose_room(browser, data) as page:
+        yield page
 
 
 def test_the_board_names_the_effect_with_its_charts(page):

@@ -8,9 +8,9 @@ from doe.measurement.load import load_measurement
 from explorer.diagnosis.follow_up_tables import read_follow_up
 from explorer.diagnosis.next_folder import write_next
 from solver.assets import measurement_folder
-from tests.browser.served import served
 from tests.browser.test_design_page import press, write_into
-from tests.browser.test_page import BEGUN, PATIENCE, SETTINGS, no_serious_fault, room, wait_for
+from tests.browser.test_diagnosis_page import diagnose_room
+from tests.browser.test_page import PATIENCE, no_serious_fault, wait_for
 from tests.browser.test_photographed_target import shot
 from tests.explorer.diagnosed import result_of_case, typed
 
@@ -35,15 +35,8 @@ def follow_up(tmp_path_factory):
 @pytest.fixture(scope="module")
 def page(browser, follow_up):
     """The room *Diagnose* of a person who has that answer."""
-    data = follow_up.parents[3]
-    with served("--store", data / "runs.sqlite", *SETTINGS, data=data, patience=30) as address:
-        page = browser.new_page(viewport={"width": 1280, "height": 1400})
-        page.set_default_timeout(PATIENCE)
-        page.add_init_script(BEGUN)
-        page.goto(address)
-        room(page, "Diagnose")
+    with diagnose_room(browser, follow_up.parents[3]) as page:
         yield page
-        page.close()
 
 
 def test_a_follow_up_is_filled_in_in_a_table_and_answered_with(page, follow_up):

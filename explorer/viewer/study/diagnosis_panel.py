@@ -11,10 +11,11 @@ from pathlib import Path
 import viser
 
 from doe.declared.budget import Budget
+from doe.measurement.scans import SUFFIXES
 from doe.record import RecordError
 from explorer.background.command_process import CommandStatus
 from explorer.background.output_folder import ResultFile
-from explorer.diagnosis.follow_up_tables import SCANNED, add_scan, packed, read_follow_up, take_filled
+from explorer.diagnosis.follow_up_tables import add_scan, packed, read_follow_up, take_filled
 from explorer.diagnosis.next_folder import NEXT, ORDER, read_next
 from explorer.diagnosis.piles import AnswerPiles, answer_piles
 from explorer.diagnosis.process import RESULT, Question
@@ -370,7 +371,7 @@ class FollowUp:
             with self._scans:
                 scan = gui.add_upload_button(
                     "Add a scan",
-                    mime_type=",".join(SCANNED),
+                    mime_type=",".join(SUFFIXES),
                     hint="Of the first pile that has none yet; unit and axis as in the first data.",
                 )
             answer = gui.add_button(
@@ -439,7 +440,7 @@ def _follow_up_markdown(result: DiagnosisResult, folder: Path) -> str:
     except (ValueError, OSError) as error:
         return escaped(str(error))
     cells = tables.cells
-    scans = f", {tables.scans} of {asked.pours} scans" if (folder / "scans").is_dir() else ""
+    scans = f", {len(tables.scanned)} of {asked.pours} scans" if (folder / "scans").is_dir() else ""
     changes = [f"{parameter_label(path)} **{parameter_value(path, new)}**" for path, new in asked.values.items()]
     if asked.turned:
         changes.append("the whole rig **turned by 180° on its bench**")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +18,15 @@ from explorer.diagnosis.follow_up_tables import (
 from explorer.errors import CommandError
 from explorer.units import observable_label
 from explorer.viewer.actions import Action, Post
-from explorer.viewer.tables.grid import WRITTEN, Column, column, entered_text, table_heading, table_to_edit
+from explorer.viewer.tables.grid import (
+    WRITTEN,
+    Column,
+    column,
+    entered_text,
+    rows_in_order,
+    table_heading,
+    table_to_edit,
+)
 from explorer.viewer.tables.table_server import TablePage
 from solver import named
 
@@ -31,7 +39,7 @@ OF_POURS, OF_BODIES = "pours", "single bodies"
 HOW_OF_BODIES = "The mean of each number, and the standard error of that mean, in the unit of its row."
 NOTHING_ASKED = "The answer that is shown under Diagnose asks for no follow-up."
 SAVED = "Saved: {} of {} values are filled in."
-OTHER_ROWS = "these are not the rows of the follow-up; open the table again"
+ROWS = "the rows of the follow-up"
 
 
 def follow_up_page(folder: Callable[[], Path | None], post: Post) -> TablePage:
@@ -101,7 +109,7 @@ def filled_numbers(tables: FollowUpTables, sent: Sequence[object]) -> list[Asked
                 entered_text(cells.get(f"pour_{k}"), f"pour {k}, {row.observable}") for k in range(1, tables.pours + 1)
             ),
         )
-        for row, cells in zip(tables.numbers, _in_order(sent, len(tables.numbers)), strict=True)
+        for row, cells in zip(tables.numbers, rows_in_order(sent, len(tables.numbers), ROWS), strict=True)
     ]
 
 
@@ -137,13 +145,5 @@ def filled_bodies(tables: FollowUpTables, sent: Sequence[object]) -> list[AskedB
     """The same of single bodies."""
     return [
         replace(row, **{key: entered_text(cells.get(key), f"{row.body}, {key}") for key in ("mean", "standard_error")})
-        for row, cells in zip(tables.bodies, _in_order(sent, len(tables.bodies)), strict=True)
+        for row, cells in zip(tables.bodies, rows_in_order(sent, len(tables.bodies), ROWS), strict=True)
     ]
-
-
-def _in_order(sent: Sequence[object], rows: int) -> list[Mapping[str, object]]:
-    """What a browser sent, in whatever order it is sorted there, by the place of each row."""
-    found = {str(row.get("id")): row for row in sent if isinstance(row, Mapping)}
-    if set(found) != {str(k) for k in range(rows)}:
-        raise CommandError(OTHER_ROWS)
-    return [found[str(k)] for k in range(rows)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from explorer.errors import CommandError
@@ -33,6 +33,17 @@ def entered_text(value: object, where: str) -> str:
     if len(text) > LONGEST_TEXT:
         raise CommandError(f"{where}: {len(text)} characters; allowed: up to {LONGEST_TEXT}")
     return text
+
+
+def rows_in_order(sent: Sequence[object], number: int, whose: str) -> list[Mapping[str, object]]:
+    """The ``number`` rows that a browser ``sent``, in whatever order it shows them, by their ``id``: 0, 1, …
+
+    Raises CommandError for other rows than those ``whose`` says, such as "the runs of the study".
+    """
+    found = {str(row.get("id")): row for row in sent if isinstance(row, Mapping)}
+    if set(found) != {str(k) for k in range(number)}:
+        raise CommandError(f"these are not {whose}; open the table again")
+    return [found[str(k)] for k in range(number)]
 
 
 def table_heading(title: str, how: str) -> None:

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from doe.studies.exclusion import ExcludedRun
 from doe.studies.study_result import StudyResult
-from explorer.errors import CommandError
 from explorer.outcomes import outcome_text
 from explorer.study.run_scene import observed_of
 from explorer.units import number, observable_label, unit_of_parameter
 from explorer.viewer.actions import Action, Post
-from explorer.viewer.tables.grid import WRITTEN, column, entered_text, table_heading, table_to_edit, with_unit
+from explorer.viewer.tables.grid import (
+    WRITTEN,
+    column,
+    entered_text,
+    rows_in_order,
+    table_heading,
+    table_to_edit,
+    with_unit,
+)
 from explorer.viewer.tables.table_server import TablePage
 
 TITLE = "Runs of the response surface"
@@ -84,12 +91,9 @@ def run_rows(result: StudyResult, excluded: Sequence[ExcludedRun]) -> list[dict[
 def excluded_runs(result: StudyResult, sent: Sequence[object]) -> list[ExcludedRun]:
     """The runs with a reason, of the rows that a browser ``sent``. Raises CommandError for rows of another study."""
     runs = [run for row in result.surface.runs for run in row]
-    found = {str(row.get("id")): row.get(REASON) for row in sent if isinstance(row, Mapping)}
-    if set(found) != {str(k) for k in range(len(runs))}:
-        raise CommandError("these are not the runs of the study; open the table again")
     excluded = []
-    for k, run in enumerate(runs):
-        reason = entered_text(found[str(k)], f"{run.title}, seed {run.seed}")
+    for run, row in zip(runs, rows_in_order(sent, len(runs), "the runs of the study"), strict=True):
+        reason = entered_text(row.get(REASON), f"{run.title}, seed {run.seed}")
         if reason:
             excluded.append(ExcludedRun(run.label, run.experiment, run.seed, reason))
     return excluded

@@ -73,7 +73,7 @@ def test_an_empty_follow_up_has_a_row_for_each_quantity_and_place_and_a_cell_for
         (one.observable, x) for one in offered for x in ([""] if one.x is None else [repr(float(x)) for x in one.x])
     }
     assert {(row.observable, row.x) for row in tables.numbers} == places
-    assert (tables.pours, tables.scans) == (3, 0)
+    assert (tables.pours, len(tables.scanned)) == (3, 0)
     assert set(tables.cells) == {""}
     assert [(row.body, row.quantity, row.unit) for row in tables.bodies] == [
         ("trefoil", "mass", "g"),
@@ -156,7 +156,7 @@ def test_scans_are_those_of_the_piles_that_have_none_yet(folder):
         f"{table(folder).stem}_1.stl",
         f"{table(folder).stem}_3.stl",
     ]
-    assert read_follow_up(folder).scans == 3
+    assert len(read_follow_up(folder).scanned) == 3
     with pytest.raises(CommandError, match=r"there is a scan of every pile \(3\)"):
         add_scan(folder, "one more.ply", b"ply")
     with pytest.raises(CommandError, match=r"notes\.docx: allowed: files ending in \.ply"):
