@@ -89,6 +89,7 @@ if TYPE_CHECKING:
     from solver.pours.pour import Pour
     from solver.pours.run import Job, capacity_for, run_pour, run_pours, run_queue
     from solver.pours.worker_pool import PourBrokeOff, WorkerPool, begin_worker, warm_up
+    from solver.single_body.plate_tests import PlateTest, plate_tests
 
 NO_HOME = "/nonexistent"
 """As Debian calls the home of accounts that have none."""
@@ -101,12 +102,14 @@ _LATE = {
     "PhotographError": "solver.photograph",
     "PhotographedPile": "solver.photograph",
     "Pour": "solver.pours.pour",
+    "PlateTest": "solver.single_body.plate_tests",
     "PourBrokeOff": "solver.pours.worker_pool",
     "begin_worker": "solver.pours.worker_pool",
     "capacity_for": "solver.pours.run",
     "check_scheduler": "solver.pours.executor",
     "executor": "solver.pours.executor",
     "open_picture": "solver.photograph",
+    "plate_tests": "solver.single_body.plate_tests",
     "read_photograph": "solver.photograph",
     "run_pour": "solver.pours.run",
     "run_pours": "solver.pours.run",
@@ -179,6 +182,7 @@ __all__ = [
     "PhotographError",
     "PhotographedPile",
     "Pile",
+    "PlateTest",
     "PluginError",
     "Pour",
     "PourBrokeOff",
@@ -233,6 +237,7 @@ __all__ = [
     "packed",
     "parameters",
     "parse_quantity",
+    "plate_tests",
     "plugged_in",
     "pour_key",
     "pour_keys",

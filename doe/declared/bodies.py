@@ -1,10 +1,12 @@
-"""What measured bodies say of effects that change the bodies: a wrong density, a scatter of sizes, another shape.
+"""What measured bodies say of effects: of a wrong density, size or shape, and of what acts at a contact with a plate.
 
-On the scales of ``doe/measurement/bodies.py`` the numbers y of a model whose effects act at amplitudes a are
+On the scales of ``doe/measurement/bodies.py``, in standard errors, the numbers y of a model whose effects act at
+amplitudes a are
 
-    y = y₀ + Σ_e s_e(a_e) + ε,    ε ~ N(0, diag(standard errors²))
+    y = y₀ + Σ_e s_e(a_e) + ε,    ε ~ N(0, 1 + K Kᵀ)
 
-with y₀ and s_e as the declared scene has them: no pour is needed for it. What calibration moves is left out.
+with y₀ and s_e as the declared scene has them, by geometry or by simulated plate tests: no pour is needed for it. K is
+what the calibrated parameters do per standard deviation; what the piles say of them is not used here.
 """
 
 from __future__ import annotations
@@ -14,17 +16,24 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import PchipInterpolator
+from scipy.linalg import solve_triangular
 
 from doe.declared.model import CandidateEffect, Declared, effect_values
 from doe.measurement.bodies import QUANTITIES, MeasuredBody, bodies_of, body_numbers
 from doe.measurement.measurement import Measurement
 from doe.record import Record
-from solver import EFFECTS, Scene, SetUpEffect, with_values
+from solver import EFFECTS, Scene, with_values
 
 FloatArray = npt.NDArray[np.float64]
+Acting = Sequence[tuple[str, float, float]]
+"""Effects that act together: name, amplitude, its standard deviation."""
 
-PLACES = 65
-"""Amplitudes at which an effect is set up; between them what it does is a straight line, to a thousandth of it."""
+PLACES = 14
+"""Amplitudes of either sign at which an effect is set up, closer together towards none, for the friction of a body that
+sticks grows as of 1 + c a; between them a monotone cubic (Fritsch and Butland 1984)."""
+NEGLIGIBLE = 0.1
+"""Shift at the end of an effect's range [standard errors] below which it does not move a number."""
 FINE = 9
 """Amplitudes within the cell of one that is weighed: a balance may tell more than one from the next."""
 
@@ -33,14 +42,15 @@ FINE = 9
 class BodyEvidence:
     """The measured numbers ``rows``, and how far ``off`` those of the declared ``scene`` they are.
 
-    ``off``: (q,) [standard errors]. ``effects``: the candidates.
+    ``factor``: (q, q), of the covariance 1 + K Kᵀ. ``off``: (q,), whitened by it. ``effects``: the candidates.
     """
 
     scene: Scene
     rows: tuple[MeasuredBody, ...]
     off: FloatArray
+    factor: FloatArray
     effects: tuple[CandidateEffect, ...]
-    _shifts: dict[str, tuple[FloatArray, FloatArray] | None] = field(default_factory=dict)
+    _shifts: dict[str, PchipInterpolator | None] = field(default_factory=dict)
 
     def log_density(self, label: str, amplitudes: FloatArray, cell: float) -> FloatArray:
         """Log densities (n,) of the numbers, less those of numbers that agree, under "base", an effect, or "a+b".
@@ -55,7 +65,7 @@ class BodyEvidence:
                 moved = self.shift(name, np.outer(steps, amplitudes[:, column]))
                 shift = (shift[:, None] + moved[None]).reshape(-1, *moved.shape[1:])
             column += len(EFFECTS[name].amplitudes)
-        logs = -0.5 * ((self.off - shift) ** 2).sum(axis=2)
+        logs = -0.5 * ((self.off - self._white(shift)) ** 2).sum(axis=2)
         return np.asarray(np.logaddexp.reduce(logs, axis=0) - np.log(len(logs)))
 
     def moved_by(self, name: str) -> bool:
@@ -63,70 +73,111 @@ class BodyEvidence:
         return self._shift(name) is not None
 
     def shift(self, name: str, amplitudes: FloatArray) -> FloatArray:
-        """By how much an effect with one amplitude moves the numbers at each of ``amplitudes``, (..., q)."""
+        """By how much [standard errors] an effect with one amplitude moves the numbers, at ``amplitudes``, (..., q)."""
         if (known := self._shift(name)) is None:
             return np.zeros((*amplitudes.shape, len(self.rows)))
-        at, shifts = known
-        return np.stack([np.interp(amplitudes, at, shifts[:, q]) for q in range(len(self.rows))], axis=-1)
+        return np.asarray(known(np.clip(amplitudes, known.x[0], known.x[-1])))
 
-    def predicted(self, acting: Iterable[tuple[str, float, float]]) -> tuple[FloatArray, FloatArray]:
-        """Mean (q,) and covariance (q, q) of the numbers with effects ``acting``: name, amplitude, its deviation."""
+    def predicted(self, acting: Acting) -> tuple[FloatArray, FloatArray]:
+        """Mean (q,) and covariance (q, q) of the numbers, whitened, with effects ``acting``."""
         mean, covariance = np.zeros(len(self.rows)), np.eye(len(self.rows))
         for name, amplitude, deviation in acting:
             if self.moved_by(name):
-                here, beside = self.shift(name, amplitude + np.array([0.0, deviation]))
+                here, beside = self._white(self.shift(name, amplitude + np.array([0.0, deviation])))
                 mean, covariance = mean + here, covariance + np.outer(beside - here, beside - here)
         return mean, covariance
 
-    def _shift(self, name: str) -> tuple[FloatArray, FloatArray] | None:
-        """Amplitudes, ascending, and by how much they move the numbers; None of an effect that moves none."""
+    def told_apart(self, answers: Sequence[Acting]) -> npt.NDArray[np.bool_]:
+        """Numbers (q,) in which two of ``answers`` differ by more than a standard deviation, parameters' in it."""
+        self.set_up(name for acting in answers for name, _, _ in acting)
+        means = np.zeros((len(answers), len(self.rows)))
+        for mean, acting in zip(means, answers, strict=True):
+            for name, amplitude, _ in acting:
+                mean += self.shift(name, np.array(amplitude))
+        return np.asarray(np.ptp(means, axis=0) > np.linalg.norm(self.factor, axis=1))
+
+    def _white(self, shift: FloatArray) -> FloatArray:
+        flat = shift.reshape(-1, len(self.rows)).T
+        return np.asarray(solve_triangular(self.factor, flat, lower=True).T.reshape(shift.shape))
+
+    def _shift(self, name: str) -> PchipInterpolator | None:
+        """By how much an effect moves the numbers, over its amplitude; None of an effect that moves none."""
         if name not in self._shifts:
-            self._shifts[name] = self._set_up(name)
+            self.set_up([name])
         return self._shifts[name]
 
-    def _set_up(self, name: str) -> tuple[FloatArray, FloatArray] | None:
-        effect = next(one for one in self.effects if one.name == name)
-        if effect.amplitudes != 1 or not issubclass(EFFECTS[name], SetUpEffect):
-            return None
-        places = np.linspace(effect.low[0], effect.high[0], PLACES)
-        scenes = [with_values(self.scene, effect_values(name, (float(a),))) for a in places]
-        deviations = np.array([one.deviation for one in self.rows])
-        still = body_numbers(self.scene, self.rows)
-        shifts = (np.array([body_numbers(scene, self.rows) for scene in scenes]) - still) / deviations
-        return (places, shifts) if shifts.any() else None
+    def set_up(self, names: Iterable[str]) -> None:
+        """Find by how much the effects ``names`` move the numbers: of all of them at once, so that no core waits."""
+        known = {one.name: one for one in self.effects}
+        effects = [known[name] for name in dict.fromkeys(names) if name not in self._shifts]
+        ends = {one.name: [end for end in (one.low[0], one.high[0]) if end] for one in effects if one.amplitudes == 1}
+        shares = (np.arange(1, PLACES + 1) / PLACES) ** 3
+        places = {
+            name: np.sort(np.concatenate([np.zeros(1), *(end * shares for end in ends[name])]))
+            for name, moved in self._moved(ends).items()
+            if (np.abs(moved) > NEGLIGIBLE).any()
+        }
+        self._shifts.update({one.name: None for one in effects})
+        self._shifts.update({name: PchipInterpolator(places[name], y) for name, y in self._moved(places).items()})
+
+    def _moved(self, amplitudes: Mapping[str, Sequence[float] | FloatArray]) -> dict[str, FloatArray]:
+        """By how much [standard errors] each effect moves the numbers at its ``amplitudes``, (n, q)."""
+        scenes = [
+            with_values(self.scene, effect_values(name, (float(a),))) for name, some in amplitudes.items() for a in some
+        ]
+        still, *moved = body_numbers([self.scene, *scenes], self.rows)
+        shifts = np.array(moved).reshape(-1, len(self.rows)) - still
+        shifts /= [one.deviation for one in self.rows]
+        last = np.cumsum([len(some) for some in amplitudes.values()])
+        return dict(zip(amplitudes, np.split(shifts, last[:-1]), strict=True)) if amplitudes else {}
 
 
 def body_evidence(measurement: Measurement, declared: Declared) -> BodyEvidence | None:
-    """What the measured bodies of ``measurement`` say; None where it has none that calibration leaves alone."""
-    if not measurement.bodies or not (kept := _beside_calibration(measurement.bodies, measurement)):
+    """What the measured bodies of ``measurement`` say; None where it has none."""
+    if not measurement.bodies:
         return None
-    scene = measurement.fit[0].scene
-    off = (np.array([one.value for one in kept]) - body_numbers(scene, kept)) / [one.deviation for one in kept]
-    return BodyEvidence(scene, kept, np.asarray(off), declared.effects)
+    found = _evidence(measurement, declared, measurement.bodies)
+    found.set_up(one.name for one in declared.effects)
+    return found
 
 
-def wanted_bodies(measurement: Measurement, declared: Declared, labels: Sequence[str]) -> BodyEvidence | None:
-    """What measuring bodies would say of the effects in ``labels``, with the usual standard errors; None for nothing.
+def wanted_bodies(measurement: Measurement, declared: Declared, answers: Sequence[Acting]) -> BodyEvidence | None:
+    """What measuring bodies would say of ``answers``, with the usual standard errors; None for nothing.
 
-    Only what is not measured yet.
+    Only what is not measured yet, and in which two answers differ.
     """
-    scene = measurement.fit[0].scene
+    scene, rows = measurement.fit[0].scene, []
     known = {(one.body, one.quantity) for one in measurement.bodies}
-    rows = []
-    for body in scene.bodies:
-        for name, quantity in QUANTITIES.items():
-            if (body.name, name) not in known:
-                mean = quantity.of(body)
-                rows.append(MeasuredBody(body.name, name, mean, quantity.usual * (mean if quantity.relative else 1.0)))
-    left = _beside_calibration(rows, measurement)
-    full = BodyEvidence(scene, left, np.zeros(len(left)), declared.effects)
-    asked = {name for label in labels for name in label.split("+")}
-    ends = {one.name: np.array([one.low[0], one.high[0]]) for one in declared.effects if one.name in asked}
-    told = np.zeros(len(left), bool)
-    for name, pair in ends.items():
-        told |= (np.abs(full.shift(name, pair)) > 1.0).any(axis=0)
-    kept = tuple(row for row, tells in zip(left, told, strict=True) if tells)
-    return BodyEvidence(scene, kept, np.zeros(len(kept)), declared.effects) if kept else None
+    asked = [
+        MeasuredBody(body.name, name, 1.0, quantity.usual)
+        for body in scene.bodies
+        for name, quantity in QUANTITIES.items()
+        if (body.name, name) not in known
+    ]
+    for one, mean in zip(asked, bodies_of([scene], asked)[0] if asked else (), strict=True):
+        error = one.standard_error * (mean if QUANTITIES[one.quantity].relative else 1.0)
+        rows.append(MeasuredBody(one.body, one.quantity, float(mean), float(error)))
+    if not rows:
+        return None
+    full = _evidence(measurement, declared, rows)
+    kept = [row for row, tells in zip(rows, full.told_apart(answers), strict=True) if tells]
+    return _evidence(measurement, declared, kept) if kept else None
+
+
+def _evidence(measurement: Measurement, declared: Declared, rows: Sequence[MeasuredBody]) -> BodyEvidence:
+    scene = measurement.fit[0].scene
+    errors = np.array([one.deviation for one in rows])
+    sides = [
+        with_values(scene, {p.name: p.within(p.middle + side * p.deviation)})
+        for p in declared.parameters
+        for side in (-1.0, 1.0)
+    ]
+    still, *moved = body_numbers([scene, *sides], rows)
+    both = np.array(moved).reshape(-1, 2, len(rows)) / errors
+    slopes = 0.5 * (both[:, 1] - both[:, 0]).T
+    factor = np.linalg.cholesky(np.eye(len(rows)) + slopes @ slopes.T)
+    off = (np.array([one.value for one in rows]) - still) / errors
+    return BodyEvidence(scene, tuple(rows), solve_triangular(factor, off, lower=True), factor, declared.effects)
 
 
 @dataclass(frozen=True)
@@ -147,19 +198,10 @@ def body_rows(scene: Scene, measured: Sequence[MeasuredBody], acting: Mapping[st
     final = with_values(
         scene, {path: x for name, one in acting.items() for path, x in effect_values(name, one).items()}
     )
-    both = zip(measured, bodies_of(scene, measured), bodies_of(final, measured), strict=True)
+    both = zip(measured, *bodies_of([scene, final], measured).tolist(), strict=True)
     return [
         BodyRow(
             one.body, one.quantity, QUANTITIES[one.quantity].unit, one.mean, one.standard_error, declared, with_effects
         )
         for one, declared, with_effects in both
     ]
-
-
-def _beside_calibration(rows: Sequence[MeasuredBody], measurement: Measurement) -> tuple[MeasuredBody, ...]:
-    """Those that no calibrated parameter changes."""
-    scene, moved = measurement.fit[0].scene, np.zeros(len(rows), bool)
-    for p in measurement.parameters:
-        low, high = (body_numbers(with_values(scene, {p.path: end}), rows) for end in (p.low, p.high))
-        moved |= low != high
-    return tuple(row for row, is_moved in zip(rows, moved, strict=True) if not is_moved)

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from scipy.linalg import block_diag
 
 from doe.analysis.covariance import shrunk_means
-from doe.declared.bodies import BodyEvidence
+from doe.declared.bodies import Acting, BodyEvidence
 from doe.declared.points import AS_IT_IS
 from doe.declared.pours import ModelPours
 from doe.diagnose.compared_features import usable
@@ -181,12 +181,16 @@ def _item(
     return CandidateExperiment(set_up.name, predictions)
 
 
+def acting_in(found: Posterior, label: str) -> Acting:
+    """What acts in the best fit of ``label``."""
+    return [(a.effect, a.value, (a.high - a.low) / INTERVAL) for a in found.fits[label].amplitudes]
+
+
 def _with_bodies(item: CandidateExperiment, found: Posterior, bodies: BodyEvidence) -> CandidateExperiment:
     """``item`` with the numbers of single bodies among what is predicted; a pour's noise on top is a little much."""
     predictions = {}
     for label, one in item.predictions.items():
-        best = [(a.effect, a.value, (a.high - a.low) / INTERVAL) for a in found.fits[label].amplitudes]
-        mean, covariance = bodies.predicted(best)
+        mean, covariance = bodies.predicted(acting_in(found, label))
         predictions[label] = Prediction(np.append(one.mean, mean), block_diag(one.covariance, covariance))
     return replace(item, predictions=predictions)
 

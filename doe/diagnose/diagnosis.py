@@ -12,7 +12,7 @@ from doe.declared.bodies import body_evidence, wanted_bodies
 from doe.declared.budget import Budget
 from doe.declared.model import Declared, declare
 from doe.declared.pours import ROOT, ModelPours, OnPour
-from doe.diagnose.candidate_experiments import CandidateExperiments, next_experiment
+from doe.diagnose.candidate_experiments import CandidateExperiments, acting_in, next_experiment
 from doe.diagnose.compared_features import Compared, measured, weighed
 from doe.diagnose.confirm import CONTRADICTED, Confirmed, confirm, held_out, model_of, residual_maps
 from doe.diagnose.posterior import Posterior, gain_by_pours, holds
@@ -253,7 +253,8 @@ def suggested(
     weights = {label: found.effects[label] for label in verdict.names[:MOST_RIVALS]}
     if NO_EFFECT in verdict.kind or len(weights) < 2:
         weights["base"] = found.nothing
-    bodies, place = wanted_bodies(measurement, training.declared, verdict.names), len(measurement.fit)
+    answers = [acting_in(found, label) for label in dict.fromkeys((*verdict.names, *weights))]
+    bodies, place = wanted_bodies(measurement, training.declared, answers), len(measurement.fit)
     candidates = next_experiment(
         training, found, weights, measurement.fit[0], lambda set_ups: pours_in(set_ups, place), bodies
     )

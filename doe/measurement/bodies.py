@@ -1,4 +1,4 @@
-"""Measured bodies: what a balance and a caliper tell of single bodies, beside what is read off their pours.
+"""Measured bodies: what a balance, a caliper and a plate tell of single bodies, beside what is read off their pours.
 
 ``measurement.toml`` names the table, ``bodies = "bodies.csv"``. A row is one number of one component of the material:
 
@@ -6,9 +6,13 @@
     seed,mass,g,0.0712,0.0006
     seed,length,mm,11.1,0.1
     seed,length_spread,1,0.08,0.01
+    seed,restitution,1,0.47,0.02
 
 ``mass``: the mean mass of a body, of a counted number weighed together. ``length``: the mean of the longest dimension.
-``length_spread``: its standard deviation from body to body over its mean.
+``length_spread``: its standard deviation from body to body over its mean. The others are of a body on a plate of the
+rig's material (``solver/single_body/plate_tests.py``): the force, over its weight, that sets it in motion along the
+plate (``apparent_static_friction``) and that keeps it sliding (``apparent_kinetic_friction``), held so that it does not
+turn; and the ``restitution`` of a fall of 20 cm after which it does not turn.
 """
 
 from __future__ import annotations
@@ -36,13 +40,14 @@ COLUMNS = ("body", "quantity", "unit", "mean", "standard_error")
 class BodyQuantity:
     """A number that can be measured of bodies: unit, what it is, and what it is of a declared component.
 
-    ``relative``: on its logarithm, so that factors add up. ``written``: unit in which it is asked for. ``how``: to
-    measure it, and with which standard error on its scale ``usual``.
+    ``of`` is None for what is simulated, by the plate test of the same name. ``relative``: on its logarithm, so that
+    factors add up. ``written``: unit in which it is asked for. ``how``: to measure it, and with which standard error on
+    its scale ``usual``.
     """
 
     unit: str
     words: str
-    of: Callable[[Body], float]
+    of: Callable[[Body], float] | None
     written: str
     how: str
     usual: float
@@ -79,6 +84,32 @@ QUANTITIES: Mapping[str, BodyQuantity] = {
         0.02,
         relative=False,
     ),
+    "apparent_static_friction": BodyQuantity(
+        "1",
+        "force that sets a body in motion along a plate of the rig's material, over its weight",
+        None,
+        "1",
+        "lay ten on the plate one by one, held so that they do not turn (three glued under a card slide as well), and "
+        "pull by a spring balance",
+        0.05,
+    ),
+    "apparent_kinetic_friction": BodyQuantity(
+        "1",
+        "force that keeps a body sliding on a plate of the rig's material, over its weight",
+        None,
+        "1",
+        "the same ten, pulled on at about 10 cm/s",
+        0.05,
+    ),
+    "restitution": BodyQuantity(
+        "1",
+        "restitution of a body that falls on a plate of the rig's material",
+        None,
+        "1",
+        "let ten fall from 20 cm and film how high they rise; those that turn do not count",
+        0.02,
+        relative=False,
+    ),
 }
 
 
@@ -102,16 +133,33 @@ class MeasuredBody(Record):
         return self.standard_error / self.mean if QUANTITIES[self.quantity].relative else self.standard_error
 
 
-def bodies_of(scene: Scene, asked: Sequence[MeasuredBody]) -> list[float]:
-    """What ``scene``, with the effects in it, has in place of ``asked``, SI."""
-    bodies = {body.name: body for body in actual(scene).bodies}
-    return [QUANTITIES[one.quantity].of(bodies[one.body]) for one in asked]
+def bodies_of(scenes: Sequence[Scene], asked: Sequence[MeasuredBody]) -> Array:
+    """What each of ``scenes``, with the effects in it, has in place of ``asked``, SI, (n, q)."""
+    found, simulated = np.zeros((len(scenes), len(asked))), []
+    for k, scene in enumerate(scenes):
+        bodies = {body.name: body for body in actual(scene).bodies}
+        for j, one in enumerate(asked):
+            of = QUANTITIES[one.quantity].of
+            if of is None:
+                simulated.append((k, j))
+            else:
+                found[k, j] = of(bodies[one.body])
+    if simulated:
+        from solver import PlateTest, plate_tests  # they bring Taichi, which a table that is read does not need
+
+        tests = [PlateTest(scenes[k], asked[j].body, asked[j].quantity) for k, j in simulated]
+        for place, x in zip(simulated, plate_tests(tests), strict=True):
+            found[place] = x
+    return found
 
 
-def body_numbers(scene: Scene, asked: Sequence[MeasuredBody]) -> Array:
-    """The same on the scales on which effects add up, (q,)."""
-    found = zip(asked, bodies_of(scene, asked), strict=True)
-    return np.array([QUANTITIES[one.quantity].on_scale(x) for one, x in found])
+def body_numbers(scenes: Sequence[Scene], asked: Sequence[MeasuredBody]) -> Array:
+    """The same on the scales on which effects add up, (n, q)."""
+    found = bodies_of(scenes, asked)
+    for j, one in enumerate(asked):
+        scale = QUANTITIES[one.quantity].on_scale
+        found[:, j] = [scale(x) for x in found[:, j]]
+    return found
 
 
 def read_bodies(path: Path, scene: Scene) -> tuple[MeasuredBody, ...]:

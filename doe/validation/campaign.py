@@ -272,7 +272,7 @@ class Answers:
         if asked.bodies:
             (order, *_) = self.orders(truth, changed, range(1))
             rng = np.random.default_rng([ROOT, *truth.case.seed, 3])
-            bodies = table_of_bodies(order.scene, asked.bodies, rng)
+            bodies = table_of_bodies(order.scene, asked.bodies, rng, order.drawn)
         with TemporaryDirectory() as folder:
             # The table of a changed condition reads like that of the condition itself; only its set-up is another one.
             self.laboratory.hand_out(Path(folder), data, scanner, (ROOT, *truth.case.seed, 2), bodies)

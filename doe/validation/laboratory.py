@@ -2,12 +2,12 @@
 
 Its file is written as ``measurement.toml`` (``doe/measurement/load.py``), without data, and with one table more,
 ``[laboratory]`` (:class:`LaboratoryTable`). Beside the table of numbers it hands out scans of its piles, made by a
-scanner of its own, and in a follow-up what its balance and caliper tell of single bodies.
+scanner of its own, and in a follow-up what its balance, caliper and plate tell of single bodies.
 """
 
 import dataclasses
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -46,6 +46,11 @@ BALANCE, CALIPER = 0.003, 0.005
 """Standard deviation of the error of all weighings together, and of all lengths, relative."""
 BY_HAND = 0.01
 """Standard deviation of a single length that a caliper is read to, relative."""
+ON_PLATE = 10
+"""Bodies that are pulled over a plate, and dropped."""
+PULLED, SHEET, DROPPED, FILM = 0.1, 0.035, 0.04, 0.01
+"""Standard deviation of a single pull, and of all together (the spring balance, and the plate's sheet, which is another
+one than the rig's), relative; of a single restitution, and of all together."""
 
 
 class LaboratoryTable(TomlTable):
@@ -202,16 +207,24 @@ def _check_ranges(ranges: ScannerRanges) -> None:
             )
 
 
-def table_of_bodies(scene: Scene, asked: Iterable[tuple[str, str]], rng: np.random.Generator) -> str:
+def table_of_bodies(
+    scene: Scene,
+    asked: Iterable[tuple[str, str]],
+    rng: np.random.Generator,
+    drawn: Callable[[float], float] = lambda height: 0.0,
+) -> str:
     """The table of what is ``asked``, component and quantity, of the bodies that ``scene`` pours, effects in it.
 
-    Means, and standard errors from the scatter of lots or bodies and what the instrument itself may be off.
+    Means, and standard errors from the scatter of lots or bodies and what the instrument itself may be off. ``drawn``:
+    by how much [weights] something that is not in ``scene`` draws a body to a plate, its centre at a height [m].
     """
     bodies = {body.name: body for body in actual(scene).bodies}
     lines = ["body,quantity,unit,mean,standard_error"]
     wanted = list(asked)
     for name in dict.fromkeys(body for body, _ in wanted):
         found = {"mass": _weighed(bodies[name], rng), **_lengths(bodies[name], rng)}
+        if tests := [quantity for body, quantity in wanted if body == name and quantity not in found]:
+            found |= _on_plate(scene, bodies[name], tests, rng, drawn)
         for body, quantity in wanted:
             if body == name:
                 unit, mean, error = found[quantity]
@@ -242,3 +255,28 @@ def _lengths(body: Body, rng: np.random.Generator) -> dict[str, tuple[str, float
         "length": ("m", mean, math.hypot(deviation / math.sqrt(MEASURED), CALIPER * mean)),
         "length_spread": ("1", spread, square / max(2.0 * spread, math.sqrt(square))),
     }
+
+
+def _on_plate(
+    scene: Scene, body: Body, tests: Sequence[str], rng: np.random.Generator, drawn: Callable[[float], float]
+) -> dict[str, tuple[str, float, float]]:
+    from solver import PlateTest, plate_tests  # they bring Taichi
+
+    truths = plate_tests([PlateTest(scene, body.name, test) for test in tests])
+    clump = body.clump
+    weight = 1.0 + drawn(float((clump.radii - clump.centres[:, 2]).max()))
+    return {
+        test: _bounced(truth, rng) if test == "restitution" else _pulled(weight * truth, rng)
+        for test, truth in zip(tests, truths, strict=True)
+    }
+
+
+def _pulled(truth: float, rng: np.random.Generator) -> tuple[str, float, float]:
+    pulls = truth * np.exp(PULLED * rng.standard_normal(ON_PLATE) + SHEET * rng.standard_normal())
+    mean = float(pulls.mean())
+    return "1", mean, math.hypot(float(pulls.std(ddof=1)) / math.sqrt(ON_PLATE), SHEET * mean)
+
+
+def _bounced(truth: float, rng: np.random.Generator) -> tuple[str, float, float]:
+    drops = np.abs(truth + DROPPED * rng.standard_normal(ON_PLATE) + FILM * rng.standard_normal())
+    return "1", float(drops.mean()), math.hypot(float(drops.std(ddof=1)) / math.sqrt(ON_PLATE), FILM)

@@ -5,6 +5,7 @@ Some are for development, and a test (``truth.py``) has all. Each pour is driven
 """
 
 import dataclasses
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -45,6 +46,8 @@ class OutsideEffect:
         Whether it acts the other way in the frame of a rig that is turned by 180° on its bench.
     needs_outlet, needs_clump
         Whether there has to be a funnel, or bodies of member spheres.
+    drawn
+        Height of a body's centre [m], amount → by how much [weights] it draws a single body to a plate.
     """
 
     name: str
@@ -55,6 +58,7 @@ class OutsideEffect:
     has_direction: bool = False
     needs_outlet: bool = False
     needs_clump: bool = False
+    drawn: Callable[[float, float], float] = lambda height, amount: 0.0
 
     def possible(self, scene: Scene) -> bool:
         """Whether it can act in ``scene``."""
@@ -184,7 +188,13 @@ OUTSIDE_EFFECTS = {
         # The plate goes up and down by a square wave of speed [m/s], 50 Hz.
         OutsideEffect(name="vibrating_plate", amount=0.05, pour=_acted_on(vibrate, HALF_PERIOD), development=True),
         # Bodies near the plate are drawn to it, q m g exp(−z/λ).
-        OutsideEffect(name="plate_attraction", amount=4.0, pour=_acted_on(attract, KICK), development=True),
+        OutsideEffect(
+            name="plate_attraction",
+            amount=4.0,
+            pour=_acted_on(attract, KICK),
+            drawn=lambda height, strength: strength * math.exp(-height / REACH),
+            development=True,
+        ),
         # Every length that is read off the pile is too large by one factor. The pour is as declared.
         OutsideEffect(
             name="misread_scale",

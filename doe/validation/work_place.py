@@ -56,6 +56,10 @@ class PourOrder:
         seen = OUTSIDE_EFFECTS[self.outside].seen if self.outside else None
         return record if seen is None else seen(record, self.amount)
 
+    def drawn(self, height: float) -> float:
+        """By how much [weights] a single body is drawn to a plate, its centre at ``height`` [m]."""
+        return OUTSIDE_EFFECTS[self.outside].drawn(height, self.amount) if self.outside else 0.0
+
     def reader(self, record: Record) -> dict[str, float]:
         """What the laboratory reads off a pour that it sees."""
         return {name: float(x) for name, x in readings_of_record(self.condition, record).items()}

@@ -17,6 +17,7 @@ from tests.doe.measurement.folders import write
 
 MASS = 2500.0 * math.pi / 6.0 * 12e-3**3
 NAMES = tuple(EFFECTS)
+pytestmark = pytest.mark.usefixtures("plates")
 
 
 @pytest.fixture
@@ -78,41 +79,71 @@ def test_averages_weigh_pairs_too(data):
     assert found.log_density(label, at, 1.5)[0] == pytest.approx(math.log(density), abs=0.05)
 
 
-def test_what_is_calibrated_is_left_out(data):
-    density = MeasuredParameter("material.glass.density", 2000.0, 3000.0, None, None, "kg/m3")
+def test_what_is_calibrated_is_known_as_well_as_the_parameter(data):
+    """ln m of a density known to ± 5 %, even over its range: both errors together, and no further off than that."""
+    density = MeasuredParameter("material.glass.density", 2285.0, 2715.0, None, None, "kg/m3")
     data = replace(data, parameters=(*data.parameters, density))
-    mass = MeasuredBody("bead", "mass", 1.1 * MASS, 0.011 * MASS)
-    assert evidence_of(data, mass) is None
-    (kept,) = evidence_of(data, mass, MeasuredBody("bead", "length", 12e-3, 1e-4)).rows
-    assert kept.quantity == "length"
+    found = evidence_of(data, MeasuredBody("bead", "mass", 1.1 * MASS, 0.011 * MASS))
+    error = 430.0 / math.sqrt(12.0) / 2500.0
+    assert found.off == pytest.approx([math.log(1.1) / math.hypot(0.01, error)], rel=1e-3)
     assert evidence_of(data) is None
 
 
+def test_two_frictions_share_what_is_not_known_of_the_declared_one(data):
+    """Both are 20 % too high, ± 5 % each: with a declared friction that is known to 10 %, hardly more than one is."""
+    friction = MeasuredParameter("pair.glass.steel.static_friction", 0.2, 0.4, 0.3, 0.03, "1")
+    names = ("apparent_static_friction", "apparent_kinetic_friction")
+    rows = [MeasuredBody("bead", name, 0.36, 0.018) for name in names]
+    sure = evidence_of(data, *rows)
+    assert sure.off @ sure.off == pytest.approx(2.0 * (math.log(1.2) / 0.05) ** 2)
+    found = evidence_of(replace(data, parameters=(friction,)), *rows)
+    covariance = 0.05**2 * np.eye(2) + math.atanh(0.1) ** 2
+    off = np.full(2, math.log(1.2))
+    assert found.off @ found.off == pytest.approx(off @ np.linalg.solve(covariance, off))
+
+
+def acting(*names, share=0.3):
+    return [(name, share * EFFECTS[name].strongest, 0.0) for name in names]
+
+
 @pytest.mark.parametrize(
-    ("labels", "wanted"),
+    ("answers", "wanted"),
     [
-        (("density_error", "adhesion_jkr"), ["mass"]),
-        (("shape_elongation+adhesion_jkr",), ["length"]),
-        (("size_dispersion",), ["mass", "length_spread"]),
-        (("rolling_resistance", "plate_tilt"), []),
+        ([acting("density_error"), []], ["mass"]),
+        ([acting("shape_elongation", "rolling_resistance"), []], ["length"]),
+        ([acting("size_dispersion"), acting("rolling_resistance")], ["mass", "length_spread"]),
+        ([acting("rolling_resistance"), []], []),
+        ([acting("plastic_contact"), acting("rolling_resistance")], ["restitution"]),
+        ([acting("kinetic_friction"), []], ["apparent_kinetic_friction"]),
+        ([acting("adhesion_jkr"), acting("adhesion_sjkr")], ["apparent_static_friction", "apparent_kinetic_friction"]),
+        ([acting("density_error"), acting("density_error")], []),
     ],
 )
-def test_what_tells_is_asked_for(data, labels, wanted):
-    found = wanted_bodies(data, declare(data, NAMES), labels)
+def test_what_tells_two_answers_apart_is_asked_for(data, answers, wanted):
+    found = wanted_bodies(data, declare(data, NAMES), answers)
     assert ([] if found is None else [row.quantity for row in found.rows]) == wanted
 
 
 def test_what_is_measured_is_not_asked_for_again(data):
     data = replace(data, bodies=(MeasuredBody("bead", "mass", MASS, 0.01 * MASS),))
-    assert wanted_bodies(data, declare(data, NAMES), ("density_error",)) is None
+    assert wanted_bodies(data, declare(data, NAMES), [acting("density_error"), []]) is None
 
 
 def test_a_prediction_knows_how_well_its_amplitude_is_known(data):
-    found = wanted_bodies(data, declare(data, NAMES), ("density_error",))
+    found = wanted_bodies(data, declare(data, NAMES), [[("density_error", 0.1, 0.05)], []])
     mean, covariance = found.predicted([("density_error", 0.1, 0.05), ("rolling_resistance", 0.1, 0.02)])
     assert mean == pytest.approx([math.log(1.1) / 0.01], rel=1e-3)
     assert covariance == pytest.approx(np.array([[1.0 + (math.log(1.15 / 1.1) / 0.01) ** 2]]), rel=0.01)
     assert found.predicted([])[0] == pytest.approx([0.0])
+
+
+def test_between_amplitudes_that_were_set_up_a_friction_is_known_to_a_fiftieth_of_its_shift(data):
+    """ln(1 + c w) of JKR adhesion over three decades of w."""
+    found = evidence_of(data, MeasuredBody("bead", "apparent_static_friction", 0.3, 0.015))
+    works = np.geomspace(0.005, 5.0, 50)
+    wanted = np.log1p(3.0 * math.pi * works * 6e-3 / (MASS * 9.81)) / 0.05
+    shifts = found.shift("adhesion_jkr", works)[:, 0]
+    assert np.abs(shifts - wanted).max() < 0.02 * wanted.max()
 
 
 def test_rows_stand_beside_both_models(data):

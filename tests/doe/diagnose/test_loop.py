@@ -244,6 +244,7 @@ def twins(theta, effects, condition, width):
     return mean
 
 
+@pytest.mark.usefixtures("plates")
 def test_what_the_data_cannot_tell_apart_is_ambiguous_and_gets_a_next_experiment(measurement, monkeypatch):
     found, said = run(measurement, monkeypatch, (("air_drag", (1.0,)),), formula=twins, held_out=())
     assert found.verdict.kind.startswith("ambiguous:"), said

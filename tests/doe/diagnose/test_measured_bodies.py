@@ -21,6 +21,7 @@ from tests.doe.measurement.folders import write
 
 MASS = 2500.0 * math.pi / 6.0 * 12e-3**3
 ALIKE = ("density_error", "rolling_resistance")
+pytestmark = pytest.mark.usefixtures("plates")
 WAYS = tuple(Way(name, name, (0.1,), 2.0) for name in ALIKE)
 
 
@@ -81,7 +82,8 @@ def test_a_follow_up_that_asks_for_bodies_knows_what_they_will_tell(data):
     """Pours that say nothing, and a mass ten standard errors off by one answer: a balance nearly always finds it."""
     nothing = Prediction(np.zeros(1), np.zeros((1, 1)))
     item = CandidateExperiment("as it is", dict.fromkeys(ALIKE, nothing))
-    bodies = wanted_bodies(data, declare(data, tuple(EFFECTS)), ALIKE)
+    answers = [[("density_error", 0.1, 1e-6)], [("rolling_resistance", 0.1, 1e-6)]]
+    bodies = wanted_bodies(data, declare(data, tuple(EFFECTS)), answers)
     found = compared(None).posterior
     known = replace(
         found.fits["density_error"], amplitudes=(Amplitude("density_error", 0, 0.1, 0.1 - 1e-6, 0.1 + 1e-6, False),)

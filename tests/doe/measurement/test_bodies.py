@@ -39,9 +39,9 @@ def test_what_is_not_measured_yet_is_no_measurement(tmp_path):
 def test_the_numbers_of_a_declared_sphere(tmp_path):
     measurement = load_measurement(folder(tmp_path, ROWS))
     mass = 2500.0 * math.pi / 6.0 * 12e-3**3
-    assert body_numbers(measurement.scene, measurement.bodies) == pytest.approx([math.log(mass), math.log(12e-3), 0.0])
     scattered = with_values(measurement.scene, {"effect.size_dispersion.spread": 0.1})
-    moved = body_numbers(scattered, measurement.bodies)
+    still, moved = body_numbers([measurement.scene, scattered], measurement.bodies)
+    assert still == pytest.approx([math.log(mass), math.log(12e-3), 0.0])
     # E[s³] of a log-normal s of mean 1 is (1 + σ²)³; it is cut off at three deviations here.
     assert moved[0] - math.log(mass) == pytest.approx(3.0 * math.log(1.01), rel=0.02)
     assert moved[2] == pytest.approx(0.1)
@@ -51,7 +51,7 @@ def test_the_numbers_of_a_declared_sphere(tmp_path):
     ("row", "wanted"),
     [
         ("nut,mass,g,2.2,0.02", "body: 'nut'; allowed: bead"),
-        ("bead,weight,g,2.2,0.02", "quantity: 'weight'; allowed: mass, length, length_spread"),
+        ("bead,weight,g,2.2,0.02", "quantity: 'weight'; allowed: mass, length, length_spread, apparent_static"),
         ("bead,mass,mm,2.2,0.02", "mean: unit 'mm' is not one of"),
         ("bead,mass,g,,0.02", "mean: "),
         ("bead,mass,g,-2.2,0.02", "mean: -2.2; allowed: more than 0"),

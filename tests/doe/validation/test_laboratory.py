@@ -8,6 +8,7 @@ from contextlib import closing
 import numpy as np
 import pytest
 
+import solver
 from doe.declared.budget import Budget
 from doe.errors import MeasurementError
 from doe.measurement import load_measurement
@@ -21,7 +22,7 @@ from doe.validation.scanner import Scanner
 from doe.validation.sets import SetRow, append_rows
 from doe.validation.truth import REPLICATES, Case, Truth
 from doe.validation.work_place import WorkPlace
-from solver import AssetNotFoundError, actual, with_values
+from solver import AssetNotFoundError, PlateTest, actual, with_values
 from tests.doe.validation.small_model import small_laboratory
 
 
@@ -164,6 +165,31 @@ def test_its_balance_and_caliper_are_right_within_what_they_state():
     *_, row = table_of_bodies(scene, asked, np.random.default_rng(1)).splitlines()
     mean, error = (float(cell) for cell in row.split(",")[3:])
     assert mean < 2.0 * error < 0.02
+
+
+def test_its_pulls_and_drops_are_right_within_what_they_state(plates):
+    """Over 400 laboratories, of bodies that stick; and of bodies that something outside draws to the plate."""
+    scene = read_laboratory(TREFOILS).declared.scene
+    sticky = with_values(scene, {"effect.adhesion_jkr.work_of_adhesion": 0.01})
+    names = ("apparent_static_friction", "apparent_kinetic_friction", "restitution")
+    truth = solver.plate_tests([PlateTest(sticky, "trefoil", name) for name in names])
+    assert truth[0] > 1.1 * solver.plate_tests([PlateTest(scene, "trefoil", names[0])])[0]
+    asked = [("trefoil", name) for name in names]
+    z = {name: [] for name in names}
+    for seed in range(400):
+        for drawn in (0.0, 3.0):
+            rows = table_of_bodies(
+                sticky, asked, np.random.default_rng(seed), lambda height, drawn=drawn: drawn
+            ).splitlines()[1:]
+            for row, wanted in zip(rows, truth, strict=True):
+                _, name, unit, mean, error = row.split(",")
+                assert unit == "1"
+                wanted *= 1.0 if name == "restitution" else 1.0 + drawn
+                z[name].append((float(mean) - wanted) / float(error))
+    for name, found in z.items():
+        # A mean of ten is a little off in its standard error: t with nine degrees of freedom has 1.13.
+        assert abs(np.mean(found)) < 0.25, name
+        assert 0.85 < np.std(found) < 1.3, name
 
 
 def test_what_was_asked_of_bodies_is_handed_out(tmp_path):

@@ -1,0 +1,152 @@
+"""What a single body shows on a plate of the rig's walls: two apparent frictions and a restitution.
+
+A body lies on the plate as it is declared, with z upward, held so that it can neither roll nor tip, and is pulled along
+by a growing force, as on a sled (ASTM D1894):
+
+    apparent static friction    F/(m g) where it begins to slide: μ_s (1 + F_a/(m g)) if its contacts adhere by F_a
+    apparent kinetic friction   F/(m g) that keeps it sliding, by how it slows down
+    restitution                 √(h₂/h₁) of a ball of its volume that falls by h₁ = ``DROP`` and rises by h₂
+
+So adhesion, a friction that falls with speed and what impacts lose are each seen by itself, where a pile shows them
+together. The force grows by the factor e in ``RAMP`` steps, and sliding is noticed late: speed grows with the square of
+the time since its onset, which is where √v, over the logarithm of the force, meets zero.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import multiprocessing as mp
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.machine import available_cores
+from solver.pours.pour_key import pour_key
+from solver.pours.worker_pool import begin_worker, deaf_to_interrupts, script_left_alone
+from solver.rigs.inclined_plane import InclinedPlane
+from solver.scenes.body import Body
+from solver.scenes.scene import Scene, actual
+from solver.single_body.bench import UPRIGHT, Bench, held
+from solver.single_body.inclined_plane import rebound_height
+
+DROP = 0.2
+"""Height of the fall [m], that of Processes 2022, 10, 185, §2.5."""
+SETTLING, RAMP, FAST, MOMENT = 3_000, 20_000, 2_000, 40
+"""Steps in which the body gets its weight, in which the pull grows by the factor e, in which it does where its onset is
+only looked for, and between two looks."""
+WEAKEST, STRONGEST = 0.3, 1e4
+"""The pull begins at this share of the declared friction; what this one [weights] does not move is not moved."""
+MARGIN = 0.7
+"""Share of the pull of the quick look at which the slow one begins."""
+NOTHING = 1e-3
+"""Friction below which nobody could measure it."""
+LATE = 0.08
+"""The onset is told once the body has slid for this share of the time in which the pull grows by e."""
+SLIDES, SLOWER, LOOKS = 0.15, 0.05, 10
+"""Speeds [m/s] between which a sliding body is watched, and how often it is looked at between them."""
+LONGEST = 1.0
+"""For so long [s] at most."""
+
+
+@dataclass(frozen=True)
+class PlateTest:
+    """The test ``name`` of the component ``body`` of ``scene``, effects in it."""
+
+    scene: Scene
+    body: str
+    name: str
+
+
+def static_pull(scene: Scene, body: Body) -> float:
+    """Apparent static friction, ``NOTHING`` to ``STRONGEST``."""
+    least = WEAKEST * scene.contact_pair(body, scene.rig.wall).static_friction
+    rough = _onset(scene, body, least, FAST)
+    return _onset(scene, body, MARGIN * rough, RAMP) if NOTHING < rough < STRONGEST else rough
+
+
+def _onset(scene: Scene, body: Body, pull: float, ramp: int) -> float:
+    """The pull [weights] that moves the body, growing by the factor e in ``ramp`` steps."""
+    bench, g = _lying(scene, body)
+    factor, path = math.exp(MOMENT / ramp), []
+    while NOTHING < pull < STRONGEST:
+        pull *= factor
+        bench.batch.set_gravity(0, (g * pull, 0.0, -g))
+        bench.run(MOMENT * bench.dt)
+        path.append((math.log(pull), max(0.0, float(bench.state()[7]))))
+        told = 0.5 * g * pull * ramp * bench.dt * LATE**2
+        if path[-1][1] > told:
+            early, slow = next(one for one in path if one[1] > 0.25 * told)
+            late, fast = path[-1]
+            if late > early:
+                early -= (late - early) * math.sqrt(slow) / (math.sqrt(fast) - math.sqrt(slow))
+            return math.exp(early)
+    return max(NOTHING, min(STRONGEST, pull))
+
+
+def kinetic_pull(scene: Scene, body: Body) -> float:
+    """Apparent kinetic friction: deceleration over g between ``SLIDES`` and ``SLOWER``; ``NOTHING`` at least."""
+    bench, g = _lying(scene, body)
+    bench.batch.enter(0, 0, bench.state()[0:3], UPRIGHT, np.array([SLIDES, 0.0, 0.0]), np.zeros(3))
+    bench.run(bench.dt)
+    first = speed = float(bench.state()[7])
+    time, step = 0.0, bench.dt
+    while speed > SLOWER and time < LONGEST:
+        bench.run(step)
+        before, speed = speed, float(bench.state()[7])
+        time += step
+        lost = max(before - speed, 1e-9)
+        step = bench.steps_of(min(10.0 * step, step * (SLIDES - SLOWER) / LOOKS / lost))
+    return max(NOTHING, (first - speed) / (g * max(bench.dt, time)))
+
+
+def restitution(scene: Scene, body: Body) -> float:
+    """Restitution of a central impact; 0 for a ball that stays on the plate."""
+    risen = rebound_height(scene, body, DROP)
+    return math.sqrt(risen / DROP) if risen > 0.0 else 0.0
+
+
+PLATE_TESTS: Mapping[str, Callable[[Scene, Body], float]] = {
+    "apparent_static_friction": static_pull,
+    "apparent_kinetic_friction": kinetic_pull,
+    "restitution": restitution,
+}
+
+
+def _lying(scene: Scene, body: Body) -> tuple[Bench, float]:
+    """``body`` at rest on the plate, and g."""
+    specimen = held(body)
+    bench, g = Bench(scene, scene.rig, specimen), math.hypot(*scene.gravity)
+    clump = specimen.clump
+    bench.put(np.array([0.0, 0.0, float((clump.radii - clump.centres[:, 2]).max())]))
+    # Its weight comes gradually: contacts that hardly damp would go on swinging.
+    for share in np.arange(1, SETTLING // MOMENT + 1) * (MOMENT / SETTLING):
+        bench.batch.set_gravity(0, (0.0, 0.0, -g * share))
+        bench.run(MOMENT * bench.dt)
+    return bench, g
+
+
+def plate_test(asked: PlateTest) -> float:
+    """The number of one test, run in this process."""
+    scene = actual(asked.scene)
+    body = next(one for one in scene.bodies if one.name == asked.body)
+    plate = InclinedPlane(body=body.name, wall=scene.rig.wall)
+    return PLATE_TESTS[asked.name](dataclasses.replace(scene, rig=plate), body)
+
+
+_KNOWN: dict[tuple[str, str, str], float] = {}
+"""What was run before, by the key of the scene, body and test."""
+
+
+def plate_tests(asked: Sequence[PlateTest]) -> list[float]:
+    """The numbers of tests, run in processes of their own, those of equal scenes once."""
+    keys = [(pour_key(one.scene, 0), one.body, one.name) for one in asked]
+    fresh = {key: one for key, one in zip(keys, asked, strict=True) if key not in _KNOWN}
+    if fresh:
+        workers = min(available_cores(), len(fresh))
+        with deaf_to_interrupts(), script_left_alone():
+            pool = mp.get_context("spawn").Pool(workers, begin_worker)
+        with pool:
+            _KNOWN.update(zip(fresh, pool.imap(plate_test, list(fresh.values()), chunksize=1), strict=True))
+    return [_KNOWN[key] for key in keys]
