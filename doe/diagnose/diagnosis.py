@@ -20,12 +20,12 @@ from doe.diagnose.result import NO_EFFECT, HeldOut, Level, Offered, Suggestion
 from doe.diagnose.training_pours import Say, TrainingPours
 from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD, Verdict, candidate, taken_back, verdict_of
 from doe.errors import MeasurementError
-from doe.holdout import HoldoutCondition, HoldoutError, MeasuredReplicates, holdout_errors
+from doe.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.measurement.bodies import MeasuredBody
 from doe.measurement.features import SCAN, feature_set
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.residual_map import ResidualMap
-from doe.measurement.summaries import summaries_of_data, summary_names, summary_uncertainties
+from doe.measurement.summaries import replicates_of, summary_names
 from doe.pour_runner import Pours
 from doe.store import Store
 
@@ -268,23 +268,6 @@ def offered(condition: Condition, c: int, compared: Compared) -> Offered:
     names = feature_set(condition)
     data = measured(condition)
     return Offered(condition.name, data.offer, len(compared.names[c]), names.offered(SCAN) - len(data.names))
-
-
-def replicates_of(condition: Condition) -> MeasuredReplicates:
-    """What was measured in ``condition``."""
-    return MeasuredReplicates(
-        condition.name,
-        summary_names(condition),
-        complete_rows(condition),
-        np.nan_to_num(summary_uncertainties(condition)),
-        condition.mean_of,
-    )
-
-
-def complete_rows(condition: Condition) -> FloatArray:
-    """The measured replicates of which every summary could be read, (r, d)."""
-    data = summaries_of_data(condition)
-    return np.asarray(data[np.isfinite(data).all(axis=1)], dtype=np.float64)
 
 
 def errors_of(conditions: Sequence[Condition], role: str, found: Conclusion) -> tuple[HoldoutError, ...]:

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from doe.holdout import MeasuredReplicates
 from doe.measurement.measurement import Condition
 from doe.measurement.observations import PROFILE, SLOPES, Readings, readings_of_data, readings_of_record
 from solver import Record
@@ -119,3 +120,20 @@ def _of_curve(condition: Condition, name: str, most: int) -> list[Summary]:
     n = observation.x.size
     places = np.unique(np.linspace(0, n - 1, min(most, n)).round().astype(int)).tolist()
     return [Summary(f"{name}({observation.x[k]:g})", observation.unit, (name,), k) for k in places]
+
+
+def replicates_of(condition: Condition) -> MeasuredReplicates:
+    """What was measured in ``condition``."""
+    return MeasuredReplicates(
+        condition.name,
+        summary_names(condition),
+        complete_rows(condition),
+        np.nan_to_num(summary_uncertainties(condition)),
+        condition.mean_of,
+    )
+
+
+def complete_rows(condition: Condition) -> Array:
+    """The measured replicates of which every summary could be read, (r, d)."""
+    data = summaries_of_data(condition)
+    return np.asarray(data[np.isfinite(data).all(axis=1)], dtype=np.float64)

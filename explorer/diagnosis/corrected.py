@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import tomlkit
 
-from doe.diagnose.diagnosis import Diagnosis, replicates_of
+from doe.diagnose.diagnosis import Diagnosis
 from doe.measurement.measurement import Condition, Measurement
+from doe.measurement.summaries import replicates_of
 from doe.studies.study import CALIBRATED
 from explorer.diagnosis.piles import model_scene
 from explorer.diagnosis.result import SHORT_PROFILE

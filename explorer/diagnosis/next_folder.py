@@ -376,8 +376,8 @@ def _readme(
         kinds = [f"- {body}, {QUANTITIES[one].words}: {QUANTITIES[one].how}" for body, one in suggestion.bodies]
         weighed = f"""## What to measure of single bodies
 
-It takes minutes, and tells a wrong density, size or shape from everything else. Write into `{BODIES}` the mean and its
-standard error (from the scatter of lots or bodies, and what the instrument may be off).
+It takes minutes, and these answers differ in it. Write into `{BODIES}` the mean and its standard error (from the
+scatter of lots or bodies, and what the instrument may be off).
 
 {_lines(kinds)}
 

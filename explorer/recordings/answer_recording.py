@@ -26,8 +26,8 @@ import numpy.typing as npt
 import rerun as rr
 import trimesh
 
-from doe.diagnose.diagnosis import replicates_of
 from doe.measurement.measurement import Condition, Role
+from doe.measurement.summaries import replicates_of
 from doe.run_records import Run, sample_of
 from doe.studies.study_result import StudyResult
 from explorer.diagnosis.piles import HeightSurface, answer_piles

@@ -311,8 +311,8 @@ def single_bodies(result: DiagnosisResult) -> Section | None:
     )
     header = ("component", "number", "measured", "declared", "off, SE", "final model", "off, SE")
     text = (
-        "Weighed and measured one by one, without a pour: this tells effects that change the bodies themselves from "
-        f"all others, and enters the probabilities. Final model: {final_model(result)}."
+        "Measured one by one, without a pour; this enters the probabilities. What a plate tells (apparent friction, "
+        f"restitution) is simulated for the models. Final model: {final_model(result)}."
     )
     return Section("Single bodies", (Text(text), Table(header, rows, "± and SE: standard error of the mean.")))
 

@@ -136,7 +136,7 @@ def measure(monkeypatch, effects, seed, formula=expected, held_out=None, instrum
         )
 
     monkeypatch.setattr(diagnosis, "measured", measured)
-    monkeypatch.setattr(diagnosis, "complete_rows", replicates)
+    monkeypatch.setattr("doe.measurement.summaries.complete_rows", replicates)
 
 
 def run(measurement, monkeypatch, effects, seed=1, formula=expected, held_out=None, budget=BUDGET):

@@ -11,11 +11,15 @@ from doe.diagnose.result import NO_EFFECT, UNEXPLAINED
 from doe.diagnose.verdict import DOUBTED, NOTHING_AT_ONCE, NOTHING_FROM, answer, verdict_of
 
 
-def posterior(nothing, outside, effects, badly=(), base=DOUBTED / 2.0):
-    """Probabilities, with models that fit but for those of ``badly``; ``base``: how probable data as far off it are."""
+def posterior(nothing, outside, effects, badly=(), base=DOUBTED / 2.0, off=3.0):
+    """Probabilities, with models that fit but for those of ``badly``.
+
+    ``base``: how probable data as far off it are; ``off``: its one parameter, in standard deviations.
+    """
     none = np.zeros(0)
     likely = {"base": base} | dict.fromkeys(effects, 0.5) | dict.fromkeys(badly, 0.1 * FITS)
-    fits = {label: Fit(label, (), *[none] * 7, 0.0, likely[label]) for label in ("base", *effects)}
+    theta = np.array([off])
+    fits = {label: Fit(label, (), theta, *[none] * 6, 0.0, likely[label]) for label in ("base", *effects)}
     return Posterior(nothing, outside, effects, fits, (), 0.0)
 
 
@@ -95,6 +99,13 @@ def test_nothing_is_named_beside_a_declared_model_that_fits(effects):
     found = posterior(0.02, 0.01, effects, base=1.01 * DOUBTED)
     assert answer(found, followed_up=True)[:2] == (f"ambiguous:{name},{NO_EFFECT}", (name,))
     assert answer(posterior(0.02, 0.01, effects, base=0.99 * DOUBTED), followed_up=True)[1] == (name,)
+
+
+@pytest.mark.parametrize(("off", "named"), [(0.0, True), (1.5, True), (2.0, False), (3.0, False)])
+def test_a_name_that_does_not_rest_on_a_parameter_far_off_stands_beside_a_model_that_fits(off, named):
+    """At T = 0.7, 0.02 becomes 0.02 exp(0.35 θ²): of 0.95 that leaves 0.9 up to θ = 1.95."""
+    found = posterior(0.02, 0.01, {"a": 0.95, "b": 0.02}, base=0.9, off=off)
+    assert answer(found, followed_up=False)[0] == ("effect:a" if named else f"ambiguous:a,{NO_EFFECT}")
 
 
 def test_the_reason_is_told():

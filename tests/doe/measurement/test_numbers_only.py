@@ -6,8 +6,8 @@ import numpy as np
 
 from doe.declared.model import declare
 from doe.diagnose.compared_features import measured
-from doe.diagnose.diagnosis import complete_rows
 from doe.measurement import load_measurement
+from doe.measurement.summaries import complete_rows
 from doe.validation.laboratory import TREFOILS, read_laboratory
 from solver import EFFECTS
 from solver.assets import measurement_folder

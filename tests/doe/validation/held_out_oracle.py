@@ -19,10 +19,11 @@ import numpy as np
 
 from doe.declared.budget import Budget
 from doe.diagnose.confirm import confirming
-from doe.diagnose.diagnosis import complete_rows, fresh_pours
+from doe.diagnose.diagnosis import fresh_pours
 from doe.diagnose.result import CalibratedModel
 from doe.holdout import HoldoutCondition, MeasuredReplicates, holdout_errors
 from doe.measurement import load_measurement, summary_names
+from doe.measurement.summaries import complete_rows
 from doe.store import Store, default_store
 from doe.validation.campaign import Answers, CampaignOrder, measured_strengths
 from doe.validation.laboratory import read_laboratory

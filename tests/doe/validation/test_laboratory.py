@@ -178,9 +178,8 @@ def test_its_pulls_and_drops_are_right_within_what_they_state(plates):
     z = {name: [] for name in names}
     for seed in range(400):
         for drawn in (0.0, 3.0):
-            rows = table_of_bodies(
-                sticky, asked, np.random.default_rng(seed), lambda height, drawn=drawn: drawn
-            ).splitlines()[1:]
+            rng = np.random.default_rng(seed)
+            _, *rows = table_of_bodies(sticky, asked, rng, lambda height, drawn=drawn: drawn).splitlines()
             for row, wanted in zip(rows, truth, strict=True):
                 _, name, unit, mean, error = row.split(",")
                 assert unit == "1"

@@ -223,7 +223,7 @@ def test_the_method_states_its_rules(result):
     assert text.count("\n- ") == 6
     assert "effect or pair is named if it reaches 90 % (after a follow-up, which" in text
     assert "the data are likely under it (p ≥ 0.01), and unlikely under the declared" in text
-    assert "unless the calibrated declared model fitted (p ≥ 0.1)." in diagnosis_markdown(result)
+    assert "unless the calibrated declared model fitted (p ≥ 0.1) and the name rested" in diagnosis_markdown(result)
     before = result | {"rule": {name: one for name, one in result["rule"].items() if name != "doubted"}}
     assert "the declared model (p <" not in diagnosis_markdown(before)
     assert "model fitted (p" not in diagnosis_markdown(before)
