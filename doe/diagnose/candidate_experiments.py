@@ -9,9 +9,9 @@ regression and the axis of a scan leave open is in the covariance.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -21,18 +21,17 @@ from doe.analysis.covariance import shrunk_means
 from doe.declared.bodies import Acting, BodyEvidence
 from doe.declared.points import AS_IT_IS
 from doe.declared.pours import ModelPours
+from doe.declared.set_ups import changed, feasible
 from doe.diagnose.compared_features import usable
 from doe.diagnose.emulator import Emulator, Lessons, emulated, planar_weights
-from doe.diagnose.next_experiment import CandidateExperiment, Prediction, fewest_pours
+from doe.diagnose.next_experiment import GIVEN_UP, CandidateExperiment, Prediction, fewest_pours
 from doe.diagnose.posterior import Posterior
-from doe.diagnose.result import Suggestion
+from doe.diagnose.result import RankedExperiment, Suggestion
 from doe.diagnose.training_pours import TrainingPours, acting
 from doe.errors import StatisticsError
-from doe.measurement.condition_table import turned as turned_scene
 from doe.measurement.features import feature_set, offer_of
 from doe.measurement.measurement import Condition
-from doe.record import Record
-from solver import EFFECTS, ParameterError, Scene, parameters, pour_rig, value, with_values
+from solver import EFFECTS
 
 FloatArray = npt.NDArray[np.float64]
 PoursIn = Callable[[Sequence[Condition]], ModelPours]
@@ -42,39 +41,6 @@ BASE_POURS, POURS, TAUGHT = 12, 4, 14
 direction when the data of the chosen one are weighed (six, and a look of eight, at least)."""
 INTERVAL = 2.0 * 1.96
 """Standard deviations in a 95 % interval."""
-
-
-@dataclass(frozen=True)
-class Change(Record):
-    """A change of the first fitted condition that a laboratory can make in minutes.
-
-    ``factors`` multiply its parameters, ``choices`` replace settings.
-    """
-
-    name: str
-    factors: Mapping[str, float] = field(default_factory=dict)
-    choices: Mapping[str, str] = field(default_factory=dict)
-
-    def named(self, turned: bool) -> str:
-        """Its name, with the rig ``turned`` by 180° on its bench or not."""
-        if not turned:
-            return self.name
-        return f"{self.name}, {TURNED}" if self.factors or self.choices else TURNED
-
-
-TURNED = "rig turned by 180° on its bench"
-"""What any change is made with where an effect with a direction is left: it costs no pours, for all else is the same in
-a turned rig, and tells what stays with the bench from what turns with the rig."""
-CHANGES = (
-    Change("as it is, poured again"),
-    Change("half the mass", {"rig.mass": 0.5}),
-    Change("half as much mass again", {"rig.mass": 1.5}),
-    Change("fed four times as fast", {"insertion.rate": 4.0}),
-    Change("fed at 0.4 times the rate", {"insertion.rate": 0.4}),
-    Change("dropped four times as fast", {"insertion.drop_speed": 4.0}),
-    Change("filled with the outlet closed, then opened", choices={"insertion.protocol": "fill_then_open"}),
-)
-"""Of any rig but for what it ``forgets``; each has its own beside them (``PourRig.quick_changes``)."""
 
 
 @dataclass(frozen=True)
@@ -116,6 +82,36 @@ def next_experiment(
     set_ups = [changed(condition, name, values, turned) for name, values in changes.items()]
     # What is measured there is weighed by all effects.
     set_ups = [one for one in set_ups if training.possible_in(one.scene)]
+    asked = dict.fromkeys(name for label in weights if label != "base" for name in label.split("+"))
+    levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in asked)
+    asked_of = () if bodies is None else tuple((row.body, row.quantity) for row in bodies.rows)
+    ranked: tuple[RankedExperiment, ...] = ()
+    planned = run_now = 0
+    # Where bodies tell all, no other set-up can gain.
+    for some in (set_ups,) if bodies is None else (set_ups[:1], set_ups):
+        items, more = _items(training, found, weights, some, pours_in)
+        run_now += more
+        if bodies is not None:
+            items = [_with_bodies(one, found, bodies) for one in items]
+        if items:
+            planned, ranked = fewest_pours(items, weights)
+            if ranked[0].chance >= sum(weights.values()) - GIVEN_UP:
+                break
+    suggestions = (
+        Suggestion(one, changes[one.name], condition.name, tuple(weights), levers, planned, turned, asked_of)
+        for one in ranked
+    )
+    return CandidateExperiments(tuple(suggestions), run_now)
+
+
+def _items(
+    training: TrainingPours,
+    found: Posterior,
+    weights: Mapping[str, float],
+    set_ups: Sequence[Condition],
+    pours_in: PoursIn,
+) -> tuple[list[CandidateExperiment], int]:
+    """What every answer predicts in each of ``set_ups``, and how many pours had to be run for it."""
     model = pours_in(set_ups)
     probes = training.base(BASE_POURS) + training.probes(found, tuple(weights), POURS)
     # All set-ups at once, so that no core waits for the last pour of one of them; what is only looked at after that.
@@ -127,19 +123,7 @@ def next_experiment(
         lessons = training.told(probes, [[row[c]] for row in rows])
         with suppress(StatisticsError):  # a set-up that jams tells nothing
             items.append(_item(training, found, weights, lessons, model, c, set_up))
-    if not items:
-        return CandidateExperiments((), model.run_now)
-    asked = dict.fromkeys(name for label in weights if label != "base" for name in label.split("+"))
-    levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in asked)
-    if bodies is not None:
-        items = [_with_bodies(one, found, bodies) for one in items]
-    asked_of = () if bodies is None else tuple((row.body, row.quantity) for row in bodies.rows)
-    planned, ranked = fewest_pours(items, weights)
-    suggestions = [
-        Suggestion(one, changes[one.name], condition.name, tuple(weights), levers, planned, turned, asked_of)
-        for one in ranked
-    ]
-    return CandidateExperiments(tuple(suggestions), model.run_now)
+    return items, model.run_now
 
 
 def _item(
@@ -225,34 +209,6 @@ def _rows(emulator: Emulator, training: TrainingPours, found: Posterior, label: 
     return np.array([here, *(here + one for one in beside)])
 
 
-def changed(condition: Condition, name: str, values: Mapping[str, float | str], about: bool) -> Condition:
-    """``condition`` under another name, with ``values`` set and the rig turned ``about`` on its bench."""
-    scene = turned_scene(condition.scene) if about else condition.scene
-    return replace(condition, name=name, scene=with_values(scene, dict(values)), turned=condition.turned != about)
-
-
 def as_suggested(condition: Condition, asked: Suggestion) -> Condition:
     """``condition`` with the change of a suggestion, under its name."""
     return changed(condition, asked.experiment.name, asked.values, asked.turned)
-
-
-def feasible(scene: Scene, calibrated: Collection[str] = ()) -> list[tuple[Change, dict[str, float | str]]]:
-    """The changes that the rig of ``scene`` can do, with the values [SI] that they come to.
-
-    None of what is ``calibrated``: every pour sets that by itself.
-    """
-    found = []
-    known = set(parameters(scene)) - set(calibrated) - set(pour_rig(scene).forgets)
-    for change in (*CHANGES, *(Change(*own) for own in pour_rig(scene).quick_changes.items())):
-        if "insertion.protocol" in change.choices and scene.numerics.duration > 0.0:
-            continue  # filled first, it would be read before it has run out
-        if not set(change.factors) | set(change.choices) <= known:
-            continue
-        values: dict[str, float | str] = {path: f * float(value(scene, path)) for path, f in change.factors.items()}
-        values |= change.choices
-        if values and all(value(scene, path) == new for path, new in values.items()):
-            continue  # as it is already
-        with suppress(ParameterError):  # beyond what the rig allows
-            with_values(scene, dict(values))
-            found.append((change, values))
-    return found

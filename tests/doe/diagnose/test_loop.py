@@ -7,6 +7,7 @@ amplitudes shift six pours by 22 standard errors in each condition.
 import hashlib
 import math
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -234,23 +235,30 @@ def test_beside_all_that_is_missing_nothing_else_is(measurement, monkeypatch):
 FITTED = {condition.name for condition in load_measurement(measurement_folder("trefoil_1")).fit}
 
 
-def twins(theta, effects, condition, width):
-    """As :func:`expected`, but the fitted conditions cannot tell drag from rolling resistance."""
+def twins(theta, effects, condition, width, hidden="air_drag"):
+    """As :func:`expected`, but the fitted conditions cannot tell the effect ``hidden`` from rolling resistance."""
     mean = expected(theta, (), condition, width)
     for name, amplitude in effects:
-        as_read = "rolling_resistance" if condition in FITTED and name == "air_drag" else name
+        as_read = "rolling_resistance" if condition in FITTED and name == hidden else name
         for k, value in enumerate(amplitude):
             mean += 9.0 * value / EFFECTS[name].strongest * direction(f"{condition} {as_read} {k}", width)
     return mean
 
 
 @pytest.mark.usefixtures("plates")
-def test_what_the_data_cannot_tell_apart_is_ambiguous_and_gets_a_next_experiment(measurement, monkeypatch):
-    found, said = run(measurement, monkeypatch, (("air_drag", (1.0,)),), formula=twins, held_out=())
+@pytest.mark.parametrize(("hidden", "bodies"), [("air_drag", ()), ("density_error", (("trefoil", "mass"),))])
+def test_what_the_data_cannot_tell_apart_is_ambiguous_and_gets_a_next_experiment(
+    measurement, monkeypatch, hidden, bodies
+):
+    planted = ((hidden, (0.5 * EFFECTS[hidden].strongest,)),)
+    found, said = run(measurement, monkeypatch, planted, formula=partial(twins, hidden=hidden), held_out=())
     assert found.verdict.kind.startswith("ambiguous:"), said
-    assert {"air_drag", "rolling_resistance"} <= set(found.verdict.names)
-    assert found.suggestions
+    assert {hidden, "rolling_resistance"} <= set(found.verdict.names)
     assert found.suggestions[0].levers
+    assert {one.bodies for one in found.suggestions} == {bodies}
+    # Where bodies tell all that can be told, no other set-up is poured.
+    names = {one.experiment.name for one in found.suggestions}
+    assert names == {"as it is, poured again"} if bodies else len(names) > 5
 
 
 def test_no_more_is_poured_where_the_noise_of_the_data_hides_what_is_between_two_answers(measurement, monkeypatch):

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import pytest
 import trimesh
 
-from doe.diagnose.candidate_experiments import CHANGES, TURNED, feasible
+from doe.declared.set_ups import CHANGES, TURNED, feasible
 from doe.diagnose.next_experiment import RankedExperiment
 from doe.diagnose.result import Suggestion
 from doe.errors import MeasurementError
