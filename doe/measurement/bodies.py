@@ -41,8 +41,9 @@ class BodyQuantity:
     """A number that can be measured of bodies: unit, what it is, and what it is of a declared component.
 
     ``of`` is None for what is simulated, by the plate test of the same name. ``relative``: on its logarithm, so that
-    factors add up. ``written``: unit in which it is asked for. ``how``: to measure it, and with which standard error on
-    its scale ``usual``.
+    factors add up. ``loads``: what two effects add to 1 adds up, as the loads on a contact do; what they take away are
+    factors. ``written``: unit in which it is asked for. ``how``: to measure it, and with which standard error on its
+    scale ``usual``.
     """
 
     unit: str
@@ -52,6 +53,7 @@ class BodyQuantity:
     how: str
     usual: float
     relative: bool = True
+    loads: bool = False
 
     def on_scale(self, x: float) -> float:
         """``x`` on the scale on which effects add up."""
@@ -92,6 +94,7 @@ QUANTITIES: Mapping[str, BodyQuantity] = {
         "lay ten on the plate one by one, held so that they do not turn (three glued under a card slide as well), and "
         "pull by a spring balance",
         0.05,
+        loads=True,
     ),
     "apparent_kinetic_friction": BodyQuantity(
         "1",
@@ -100,6 +103,7 @@ QUANTITIES: Mapping[str, BodyQuantity] = {
         "1",
         "the same ten, pulled on at about 10 cm/s",
         0.05,
+        loads=True,
     ),
     "restitution": BodyQuantity(
         "1",

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from doe.declared.bodies import body_evidence, body_rows, wanted_bodies
+from doe.declared.bodies import TOGETHER, body_evidence, body_rows, wanted_bodies
 from doe.declared.model import declare
 from doe.measurement import load_measurement
 from doe.measurement.bodies import MeasuredBody
@@ -100,6 +100,23 @@ def test_two_frictions_share_what_is_not_known_of_the_declared_one(data):
     covariance = 0.05**2 * np.eye(2) + math.atanh(0.1) ** 2
     off = np.full(2, math.log(1.2))
     assert found.off @ found.off == pytest.approx(off @ np.linalg.solve(covariance, off))
+
+
+@pytest.mark.parametrize("second", ["wall_adhesion", "kinetic_friction"])
+def test_loads_of_two_adhesions_add_up_and_a_lower_friction_is_a_factor(data, second):
+    """The number by both is the likeliest, of a density as wide as 0.05 and ``TOGETHER``; not the sum of logarithms."""
+    row = "apparent_static_friction" if second == "wall_adhesion" else "apparent_kinetic_friction"
+    at = {"adhesion_jkr": 2.0, "wall_adhesion": 3.0, "kinetic_friction": 0.4}
+    load = 3.0 * math.pi * 6e-3 / (MASS * 9.81)
+    wanted = 0.3 * ((1.0 + 5.0 * load) if second == "wall_adhesion" else 0.6 * (1.0 + 2.0 * load))
+    names = [name for name in NAMES if name in ("adhesion_jkr", second)]
+    both, amplitudes = "+".join(names), np.array([[at[name] for name in names]])
+    found = evidence_of(data, MeasuredBody("bead", row, wanted, 0.05 * wanted))
+    width = math.hypot(0.05, TOGETHER)
+    assert found.log_density(both, amplitudes, 1.0 + 1e-9) == pytest.approx([-math.log(width / 0.05)], abs=0.01)
+    mean, covariance = found.predicted([(name, at[name], 0.0) for name in names])
+    assert mean == pytest.approx(found.off, rel=0.01)
+    assert covariance == pytest.approx(np.array([[(width / 0.05) ** 2]]))
 
 
 def acting(*names, share=0.3):
