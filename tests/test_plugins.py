@@ -74,19 +74,27 @@ def test_the_package_has_one_thing_of_every_kind():
     assert {entry.partition(".")[0] for entry in metadata()[2]} == KINDS
 
 
-def pours(site, tmp_path, source, *settings):
+def pours(site, tmp_path, source, *settings, seed=1):
     """Result of a pour of 5 g."""
     sets = [word for one in settings for word in ("--set", one)]
-    return json.loads(explorer(site, "simulate", source, *SMALL, *sets, "--json", cwd=tmp_path))
+    return json.loads(explorer(site, "simulate", source, *SMALL, *sets, "--seed", str(seed), "--json", cwd=tmp_path))
 
 
 def test_an_effect_is_a_parameter_and_acts(site, tmp_path):
     assert "effect.stokes_drag.resistance" in explorer(site, "parameters")
     # A seed of 0.1 g falls no faster than m g/k = 0.1 m/s; without drag it would reach 1 m/s.
-    plain, slowed = (
-        pours(site, tmp_path, "funnel", f"effect.stokes_drag.resistance={k}")["observables"] for k in (0, 0.01)
-    )
-    assert slowed["discharge_time_s"]["value"] > 1.2 * plain["discharge_time_s"]["value"]
+    # So few bodies jam now and then, and which seeds do depends on the processor's rounding.
+    for seed in range(1, 6):
+        times = [
+            pours(site, tmp_path, "funnel", f"effect.stokes_drag.resistance={k}", seed=seed)["observables"][
+                "discharge_time_s"
+            ]["value"]
+            for k in (0, 0.01)
+        ]
+        if None not in times:
+            break
+    plain, slowed = times
+    assert slowed > 1.2 * plain
     code = """
 import json
 from explorer.viewer.pour.live_panel import effect_targets

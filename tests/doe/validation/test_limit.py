@@ -146,7 +146,15 @@ def test_a_study_of_made_up_pours():
     assert found.pours["a strong"] == 192
 
 
-def test_features_that_never_vary_change_no_bit_of_a_study():
+def leaves(study):
+    """Numbers and words of a study, in order."""
+    if isinstance(study, dict):
+        return [leaf for key, one in study.items() for leaf in (key, *leaves(one))]
+    return [leaf for one in study for leaf in leaves(one)] if isinstance(study, list) else [study]
+
+
+def test_features_that_never_vary_change_no_number_of_a_study():
+    """But for the rounding of sums over more features, which is the processor's."""
     shifts = {
         f"{name} {level}": share * unit(k)
         for k, name in enumerate("ab")
@@ -159,7 +167,9 @@ def test_features_that_never_vary_change_no_bit_of_a_study():
     }
     levels = [Level(Direction(name, name, (0.5,)), 0.5, 12.0) for name in "ab"]
     padded = limit_study(ReferencePours(blocks, sample.parameters), levels, {"scan": [48, 48]})
-    assert padded.to_dict() == limit_study(sample, levels, {"scan": [6, 6]}).to_dict()
+    both = leaves(padded.to_dict()), leaves(limit_study(sample, levels, {"scan": [6, 6]}).to_dict())
+    for one, other in zip(*both, strict=True):
+        assert one == (pytest.approx(other, rel=1e-9, abs=1e-12) if isinstance(other, float) else other)
 
 
 def test_the_amplitude_is_sought_that_shifts_by_as_much_as_wanted():
