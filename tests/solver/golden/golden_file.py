@@ -28,7 +28,7 @@ from solver.version import FITTING, PHYSICS
 FILE = Path(__file__).with_name("golden.json")
 FIRST_STEPS = Path(__file__).with_name("first_steps.npz")
 TOLERANCE = 4e-12
-"""On another processor. A change by one unit in the last place grows to 1e-12 rad/s of 5 rad/s over the first steps, and
+"""On another processor. A change by one unit in the last place grows to 1e-12 rad/s of 5 rad/s over the first steps;
 by the series of the velocity-dependent damper to 1.2e-12 between two processors."""
 INSTRUCTION_SETS = re.compile(r"sse|ssse|avx|fma|f16c|bmi|popcnt|movbe|adx|amx|neon|asimd|sve")
 
