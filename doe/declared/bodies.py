@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -93,7 +93,8 @@ class BodyEvidence:
         moved = [one for one in acting if self.moved_by(one[0])]
         still = [self.shift(name, np.array(amplitude)) for name, amplitude, _ in moved]
         mean = self._together(still, (len(self.rows),))
-        covariance = self._factor_of(still) @ self._factor_of(still).T
+        factor = self._factor_of(still)
+        covariance = factor @ factor.T
         for k, (name, amplitude, deviation) in enumerate(moved):
             beside = [*still[:k], self.shift(name, np.array(amplitude + deviation)), *still[k + 1 :]]
             more = self._together(beside, mean.shape) - mean
@@ -148,6 +149,8 @@ class BodyEvidence:
 
     def _moved(self, amplitudes: Mapping[str, Sequence[float] | FloatArray]) -> dict[str, FloatArray]:
         """By how much [standard errors] each effect moves the numbers at its ``amplitudes``, (n, q)."""
+        if not amplitudes:
+            return {}
         scenes = [
             with_values(self.scene, effect_values(name, (float(a),))) for name, some in amplitudes.items() for a in some
         ]
@@ -155,7 +158,7 @@ class BodyEvidence:
         shifts = np.array(moved).reshape(-1, len(self.rows)) - still
         shifts /= [one.deviation for one in self.rows]
         last = np.cumsum([len(some) for some in amplitudes.values()])
-        return dict(zip(amplitudes, np.split(shifts, last[:-1]), strict=True)) if amplitudes else {}
+        return dict(zip(amplitudes, np.split(shifts, last[:-1]), strict=True))
 
 
 def _white(factor: FloatArray, shift: FloatArray) -> FloatArray:
@@ -178,22 +181,19 @@ def wanted_bodies(measurement: Measurement, declared: Declared, answers: Sequenc
 
     Only what is not measured yet, and in which two answers differ.
     """
-    scene, rows = measurement.fit[0].scene, []
     known = {(one.body, one.quantity) for one in measurement.bodies}
-    asked = [
+    # Of a mean of one a relative error is the error.
+    rows = [
         MeasuredBody(body.name, name, 1.0, quantity.usual)
-        for body in scene.bodies
+        for body in measurement.fit[0].scene.bodies
         for name, quantity in QUANTITIES.items()
         if (body.name, name) not in known
     ]
-    for one, mean in zip(asked, bodies_of([scene], asked)[0] if asked else (), strict=True):
-        error = one.standard_error * (mean if QUANTITIES[one.quantity].relative else 1.0)
-        rows.append(MeasuredBody(one.body, one.quantity, float(mean), float(error)))
     if not rows:
         return None
     full = _evidence(measurement, declared, rows)
     kept = [row for row, tells in zip(rows, full.told_apart(answers), strict=True) if tells]
-    return _evidence(measurement, declared, kept) if kept else None
+    return replace(_evidence(measurement, declared, kept), off=np.zeros(len(kept))) if kept else None
 
 
 def _evidence(measurement: Measurement, declared: Declared, rows: Sequence[MeasuredBody]) -> BodyEvidence:

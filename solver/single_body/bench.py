@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,6 +81,11 @@ class Bench:
         """Place the specimen at rest: centre of mass [m] and orientation wxyz."""
         self.batch.enter(0, 0, position, quaternion, np.zeros(3), np.zeros(3))
 
+    def lay(self) -> None:
+        """Place the specimen at rest on a plate at z = 0, as it is declared."""
+        clump = next(iter(self.scene.bodies)).clump
+        self.put(np.array([0.0, 0.0, float((clump.radii - clump.centres[:, 2]).max())]))
+
     def run(self, duration: float) -> dict[str, float]:
         """Advance by ``duration`` [s], at least one step; returns the summary, columns ``world.SUMMARY_COLUMNS``."""
         steps = max(1, round(duration / self.dt))
@@ -93,6 +99,16 @@ class Bench:
     def state(self) -> Array:
         """Position 0:3, quaternion 3:7, velocity 7:10, spin 10:13 of the specimen."""
         return self.batch.bodies(0, 1)[0]
+
+
+def onset_of(path: Sequence[tuple[float, float]], told: float) -> float:
+    """x where √v = 0, on the line through the first point (x, v) of ``path`` with v above a quarter of ``told`` and the
+    last one."""
+    first, slow = next(one for one in path if one[1] > 0.25 * told)
+    last, fast = path[-1]
+    if last == first:
+        return first
+    return first - (last - first) * math.sqrt(slow) / (math.sqrt(fast) - math.sqrt(slow))
 
 
 def ball(body: Body) -> Body:

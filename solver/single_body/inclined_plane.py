@@ -18,7 +18,7 @@ import numpy as np
 from solver.rigs.inclined_plane import InclinedPlane
 from solver.scenes.body import Body
 from solver.scenes.scene import Scene
-from solver.single_body.bench import Bench, BenchResult, Quantity, ball, held
+from solver.single_body.bench import Bench, BenchResult, Quantity, ball, held, onset_of
 
 FAST = 20.0
 """Speed of the first tilt, and of the way to where the second begins [°/s]."""
@@ -79,8 +79,7 @@ def _tilt(scene: Scene, specimen: Body, start: float, rate: float) -> tuple[floa
     """Angle of the onset [°], NaN if the body holds, and the path; tilted by ``rate`` [°/s] from ``start`` on."""
     bench = Bench(scene, scene.rig, specimen)
     gravity = math.hypot(*scene.gravity)
-    clump = specimen.clump
-    bench.put(np.array([0.0, 0.0, float((clump.radii - clump.centres[:, 2]).max())]))
+    bench.lay()
     _set_tilt(bench, gravity, 0.0)
     bench.run(SETTLING)
     origin, tilt, path = float(bench.state()[0]), 0.0, Path()
@@ -92,17 +91,8 @@ def _tilt(scene: Scene, specimen: Body, start: float, rate: float) -> tuple[floa
         state = bench.state()
         path.append((tilt, float(state[0]) - origin, float(state[7])))
         if state[7] > SLIDING:
-            return _onset(path), path
+            return max(0.0, onset_of([(tilt, speed) for tilt, _, speed in path], SLIDING)), path
     return math.nan, path
-
-
-def _onset(path: Path) -> float:
-    """Tilt [°] where √v = 0, on the line through the first moment above a quarter of ``SLIDING`` and the last one."""
-    first, _, slow = next(moment for moment in path if moment[2] > 0.25 * SLIDING)
-    last, _, fast = path[-1]
-    if last == first:
-        return first
-    return max(0.0, first - (last - first) * math.sqrt(slow) / (math.sqrt(fast) - math.sqrt(slow)))
 
 
 def _set_tilt(bench: Bench, gravity: float, tilt_deg: float) -> None:

@@ -28,7 +28,7 @@ from solver.pours.worker_pool import begin_worker, deaf_to_interrupts, script_le
 from solver.rigs.inclined_plane import InclinedPlane
 from solver.scenes.body import Body
 from solver.scenes.scene import Scene, actual
-from solver.single_body.bench import UPRIGHT, Bench, held
+from solver.single_body.bench import UPRIGHT, Bench, held, onset_of
 from solver.single_body.inclined_plane import rebound_height
 
 DROP = 0.2
@@ -77,11 +77,7 @@ def _onset(scene: Scene, body: Body, pull: float, ramp: int) -> float:
         path.append((math.log(pull), max(0.0, float(bench.state()[7]))))
         told = 0.5 * g * pull * ramp * bench.dt * LATE**2
         if path[-1][1] > told:
-            early, slow = next(one for one in path if one[1] > 0.25 * told)
-            late, fast = path[-1]
-            if late > early:
-                early -= (late - early) * math.sqrt(slow) / (math.sqrt(fast) - math.sqrt(slow))
-            return math.exp(early)
+            return math.exp(onset_of(path, told))
     return max(NOTHING, min(STRONGEST, pull))
 
 
@@ -116,10 +112,8 @@ PLATE_TESTS: Mapping[str, Callable[[Scene, Body], float]] = {
 
 def _lying(scene: Scene, body: Body) -> tuple[Bench, float]:
     """``body`` at rest on the plate, and g."""
-    specimen = held(body)
-    bench, g = Bench(scene, scene.rig, specimen), math.hypot(*scene.gravity)
-    clump = specimen.clump
-    bench.put(np.array([0.0, 0.0, float((clump.radii - clump.centres[:, 2]).max())]))
+    bench, g = Bench(scene, scene.rig, held(body)), math.hypot(*scene.gravity)
+    bench.lay()
     # Its weight comes gradually: contacts that hardly damp would go on swinging.
     for share in np.arange(1, SETTLING // MOMENT + 1) * (MOMENT / SETTLING):
         bench.batch.set_gravity(0, (0.0, 0.0, -g * share))
