@@ -24,9 +24,9 @@ from doe.declared.pours import ModelPours
 from doe.declared.set_ups import changed, feasible
 from doe.diagnose.compared_features import usable
 from doe.diagnose.emulator import Emulator, Lessons, emulated, planar_weights
-from doe.diagnose.next_experiment import GIVEN_UP, CandidateExperiment, Prediction, fewest_pours
+from doe.diagnose.next_experiment import GIVEN_UP, CandidateExperiment, Prediction, fewest_pours, rank_experiments
 from doe.diagnose.posterior import Posterior
-from doe.diagnose.result import RankedExperiment, Suggestion
+from doe.diagnose.result import BODIES_ALONE, RankedExperiment, Suggestion
 from doe.diagnose.training_pours import TrainingPours, acting
 from doe.errors import StatisticsError
 from doe.measurement.features import feature_set, offer_of
@@ -84,7 +84,7 @@ def next_experiment(
     set_ups = [one for one in set_ups if training.possible_in(one.scene)]
     asked = dict.fromkeys(name for label in weights if label != "base" for name in label.split("+"))
     levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in asked)
-    asked_of = () if bodies is None else tuple((row.body, row.quantity) for row in bodies.rows)
+    asked_of = () if bodies is None else _asked_of(bodies)
     ranked: tuple[RankedExperiment, ...] = ()
     planned = run_now = 0
     # Where bodies tell all, no other set-up can gain.
@@ -102,6 +102,19 @@ def next_experiment(
         for one in ranked
     )
     return CandidateExperiments(tuple(suggestions), run_now)
+
+
+def check_by_bodies(
+    found: Posterior, weights: Mapping[str, float], condition: Condition, bodies: BodyEvidence
+) -> Suggestion:
+    """What ``bodies``, without a pour, would tell of an answer and of what it may be mistaken for: ``weights``."""
+    predictions = {label: Prediction(*bodies.predicted(acting_in(found, label))) for label in weights}
+    (ranked,) = rank_experiments([CandidateExperiment(BODIES_ALONE, predictions)], weights, math.inf)
+    return Suggestion(ranked, {}, condition.name, tuple(weights), (), 0, bodies=_asked_of(bodies))
+
+
+def _asked_of(bodies: BodyEvidence) -> tuple[tuple[str, str], ...]:
+    return tuple((row.body, row.quantity) for row in bodies.rows)
 
 
 def _items(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -12,11 +13,11 @@ from doe.declared.bodies import body_evidence, wanted_bodies
 from doe.declared.budget import Budget
 from doe.declared.model import Declared, declare
 from doe.declared.pours import ROOT, ModelPours, OnPour
-from doe.diagnose.candidate_experiments import CandidateExperiments, acting_in, next_experiment
+from doe.diagnose.candidate_experiments import CandidateExperiments, acting_in, check_by_bodies, next_experiment
 from doe.diagnose.compared_features import Compared, measured, weighed
 from doe.diagnose.confirm import CONTRADICTED, Confirmed, confirm, held_out, model_of, residual_maps
 from doe.diagnose.posterior import Posterior, gain_by_pours, holds
-from doe.diagnose.result import NO_EFFECT, HeldOut, Level, Offered, Suggestion
+from doe.diagnose.result import BASE, NO_EFFECT, UNEXPLAINED, HeldOut, Level, Offered, Suggestion
 from doe.diagnose.training_pours import Say, TrainingPours
 from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD, Verdict, candidate, taken_back, verdict_of
 from doe.errors import MeasurementError
@@ -46,6 +47,8 @@ FIRST_OTHER_ROOT = 100
 """Roots of other seeds begin here: below it are those of laboratories and of reference pours."""
 MOST_RIVALS = 4
 """That the next experiment is chosen for."""
+MISTAKEN = 0.01
+"""Probability from which on an answer counts among those that the one given may be mistaken for."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +101,8 @@ def run_diagnosis(
     """Diagnose ``measurement`` against its declared model, with ``effects`` as candidates.
 
     Data sets of one model share their pours; those of another ``seed`` are others. The conditions of
-    a ``follow_up`` are fitted as well. ``plan_next``: whether an ambiguous answer pours what could be measured next.
+    a ``follow_up`` are fitted as well. ``plan_next``: whether what could be measured next is looked for, and poured
+    where the answer is ambiguous.
     """
     declared, paths = declare(measurement, effects), [p.path for p in measurement.parameters]
     if follow_up is not None:
@@ -139,11 +143,11 @@ def run_diagnosis(
 
 
 def joined(measurement: Measurement, follow_up: Measurement) -> Measurement:
-    """The data with the fitted conditions of a follow-up.
+    """The data with the fitted conditions and the single bodies of a follow-up.
 
     Raises MeasurementError where the follow-up has other parameters, or a condition of a name that is there already.
     """
-    if follow_up.parameters != measurement.parameters:
+    if follow_up.conditions and follow_up.parameters != measurement.parameters:
         raise MeasurementError(f"{follow_up.folder}: its [parameters] differ from those of {measurement.folder}")
     known = {condition.name for condition in measurement.conditions}
     for condition in follow_up.fit:
@@ -247,20 +251,39 @@ def odds(found: Posterior) -> str:
 def suggested(
     verdict: Verdict, found: Posterior, training: TrainingPours, measurement: Measurement, pours_in: PoursAt
 ) -> CandidateExperiments:
-    """What to measure next: the first of the fitted conditions changed, and bodies; nothing unless it is ambiguous."""
+    """What to measure next: the first of the fitted conditions changed, and bodies, where the answer is ambiguous;
+    bodies alone where one is given; nothing where it is unexplained.
+    """
     if not verdict.kind.startswith("ambiguous"):
-        return CandidateExperiments((), 0)
+        return checked_by_bodies(verdict, found, training.declared, measurement)
     weights = {label: found.effects[label] for label in verdict.names[:MOST_RIVALS]}
     if NO_EFFECT in verdict.kind or len(weights) < 2:
-        weights["base"] = found.nothing
+        weights[BASE] = found.nothing
     answers = [acting_in(found, label) for label in dict.fromkeys((*verdict.names, *weights))]
     bodies, place = wanted_bodies(measurement, training.declared, answers), len(measurement.fit)
     candidates = next_experiment(
         training, found, weights, measurement.fit[0], lambda set_ups: pours_in(set_ups, place), bodies
     )
     # It is chosen for the likeliest answers, and told of all that are left.
-    left = (*verdict.names, *(label for label in weights if label == "base"))
+    left = (*verdict.names, *(label for label in weights if label == BASE))
     return CandidateExperiments(tuple(replace(one, rivals=left) for one in candidates.suggestions), candidates.run_now)
+
+
+def checked_by_bodies(
+    verdict: Verdict, found: Posterior, declared: Declared, measurement: Measurement
+) -> CandidateExperiments:
+    """What of single bodies tells the answer that is given from the declared model, and from what it may be mistaken
+    for; nothing where no number does.
+    """
+    if verdict.kind == UNEXPLAINED:
+        return CandidateExperiments((), 0)
+    (answer,) = verdict.names or (BASE,)
+    odds_of = {**found.effects, BASE: max(found.nothing, sys.float_info.min)}
+    others = [label for label, p in odds_of.items() if label != answer and (p >= MISTAKEN or label == BASE)]
+    weights = {label: odds_of[label] for label in (answer, *sorted(others, key=lambda one: -odds_of[one]))}
+    bodies = wanted_bodies(measurement, declared, [acting_in(found, label) for label in weights])
+    checks = () if bodies is None else (check_by_bodies(found, weights, measurement.fit[0], bodies),)
+    return CandidateExperiments(checks, 0)
 
 
 def offered(condition: Condition, c: int, compared: Compared) -> Offered:

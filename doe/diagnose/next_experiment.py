@@ -50,11 +50,12 @@ class CandidateExperiment:
 
 
 def rank_experiments(
-    candidates: Sequence[CandidateExperiment], weights: Mapping[str, float], replicates: int
+    candidates: Sequence[CandidateExperiment], weights: Mapping[str, float], replicates: float
 ) -> tuple[RankedExperiment, ...]:
     """Return the candidates, the best chance of an answer first, the larger separation first among equals.
 
-    weights: probabilities of the answers that are left; replicates: pours that are asked for.
+    weights: probabilities of the answers that are left; replicates: pours that are asked for, infinity where nothing is
+    poured and all noise is in the predictions.
     """
     rows = [
         RankedExperiment(
@@ -75,7 +76,7 @@ def fewest_pours(
 
 
 def chance_of_an_answer(
-    item: CandidateExperiment, weights: Mapping[str, float], replicates: int, seed: int = 0
+    item: CandidateExperiment, weights: Mapping[str, float], replicates: float, seed: int = 0
 ) -> float:
     """Return how often the true answer is given, by `DRAWS` made-up data sets of each.
 

@@ -15,6 +15,8 @@ from doe.record import Record
 BASE = "base"
 """Label of the declared model without an effect."""
 NO_EFFECT, UNEXPLAINED = "no_missing_effect", "unexplained"
+BODIES_ALONE = "single bodies, without a pour"
+"""Name of the experiment that pours nothing."""
 
 
 @dataclass(frozen=True)
@@ -200,7 +202,7 @@ class Suggestion(Record):
     levers
         By their nature: what reveals each of the rivals' effects.
     pours
-        That it asks for.
+        That it asks for; 0 where single bodies alone are measured, to check an answer that is given already.
     turned
         Whether the rig is turned by 180° on its bench.
     bodies

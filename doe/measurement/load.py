@@ -61,8 +61,8 @@ class MeasurementFile(TomlTable):
     condition: list[Annotated[Settings, Like(ConditionTable)]] = Field(default_factory=list)
 
 
-def load_measurement(folder: Path) -> Measurement:
-    """The measured data set in ``folder``.
+def load_measurement(folder: Path, follow_up: bool = False) -> Measurement:
+    """The measured data set in ``folder``. That of a ``follow_up`` may hold single bodies alone, and no condition.
 
     Raises:
         MeasurementError: one line naming file, key, value and what is allowed.
@@ -73,7 +73,7 @@ def load_measurement(folder: Path) -> Measurement:
     with naming_file(path, *WRONG, raised=MeasurementError, within=path.parent):
         table = read_toml(path)
         outside = [f"{key}: {file} is outside the folder" for key, file in outside_files(folder, table)]
-        return _read(folder, table, outside)
+        return _read(folder, table, outside, follow_up)
 
 
 def outside_files(folder: Path, table: Mapping[str, Any]) -> Iterator[tuple[str, Path]]:
@@ -132,16 +132,16 @@ def _of_body(path: Path) -> Iterator[Path]:
         yield from (path.parent / own_path(file) for file in files_named_in(read_toml(path)) if isinstance(file, str))
 
 
-def _read(folder: Path, table: Settings, outside: Sequence[str]) -> Measurement:
+def _read(folder: Path, table: Settings, outside: Sequence[str], follow_up: bool) -> Measurement:
     file = checked(MeasurementFile, table)
     base = load_material(file.material, relative_to=folder)
-    given = _condition_entries(file.condition)
+    given = _condition_entries(file.condition, bare=follow_up and file.bodies is not None)
     declared, bare = [], []
     for entry in given:
         with _within(entry.name):
             declared.append(base if entry.material is None else load_material(entry.material, relative_to=folder))
             bare.append(in_rig(declared[-1], entry.rig))
-    measured, notes = read_parameters(file.parameters, bare)
+    measured, notes = read_parameters(file.parameters, bare or [base])
     uncertainty = _uncertainty(file.uncertainty)
     names = [entry.name for entry in given]
     piles, strangers = pile_files(folder, names)
@@ -194,14 +194,15 @@ def _of_one_material(bodies: Sequence[MeasuredBody], conditions: Sequence[Condit
             raise MeasurementError(f"bodies: {row.body}: differs between the fitted conditions; allowed: one material")
 
 
-def _condition_entries(tables: Sequence[Settings]) -> list[ConditionTable]:
+def _condition_entries(tables: Sequence[Settings], bare: bool) -> list[ConditionTable]:
+    """The conditions in their order; ``bare``: there need be none."""
     given: list[ConditionTable] = []
     for table in tables:
         with _within(table.get("name")):
             given.append(checked(ConditionTable, table))
         if given[-1].name in (entry.name for entry in given[:-1]):
             raise MeasurementError(f"condition.name: {given[-1].name!r} appears twice; allowed: each name once")
-    if not any(entry.role == "fit" for entry in given):
+    if not any(entry.role == "fit" for entry in given) and (given or not bare):
         raise MeasurementError(
             f"condition.role: none of {len(given)} conditions has the role fit; at least one is needed"
         )

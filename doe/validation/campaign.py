@@ -58,7 +58,7 @@ class CampaignOrder:
 
     minutes: stop after so long, infinite by default; 0: judge nothing. scheduler: of Dask, whose workers pour.
     shard: every ``of``-th set from the ``shard``-th on. wide: sets of all strengths, for development. follow_up:
-    whether ambiguous answers are followed up, which takes most of the time. cases: instead of the schedule's.
+    whether what an answer asks for is measured, which takes most of the time. cases: instead of the schedule's.
     strengths: instead of those by the laboratory's reference pours.
     """
 
@@ -157,7 +157,7 @@ class Answers:
     place: WorkPlace
     budget: Budget
     follow_up: bool = True
-    """Whether an ambiguous answer is followed up."""
+    """Whether what an answer asks for is measured."""
 
     @property
     def measurement(self) -> Measurement:
@@ -261,11 +261,15 @@ class Answers:
     def followed_up(
         self, truth: Truth, asked: Suggestion, scanner: Scanner | None, occasion: str = "next"
     ) -> Measurement | None:
-        """What the laboratory measures in the set-up that it is asked for; None where its pours keep breaking off."""
+        """What the laboratory measures in the set-up that it is asked for, and of single bodies; None where its pours
+        keep breaking off.
+        """
         place = next(c for c, one in enumerate(self.measurement.conditions) if one.name == asked.condition)
         condition = self.measurement.conditions[place]
         changed = replace(as_suggested(condition, asked), name=condition.name)
-        data = self.measured(truth, [changed], f" {occasion} {asked.experiment.name}", asked.pours)
+        data: Data | None = {}
+        if asked.pours:
+            data = self.measured(truth, [changed], f" {occasion} {asked.experiment.name}", asked.pours)
         if data is None:
             return None
         bodies = ""
@@ -276,9 +280,8 @@ class Answers:
         with TemporaryDirectory() as folder:
             # The table of a changed condition reads like that of the condition itself; only its set-up is another one.
             self.laboratory.hand_out(Path(folder), data, scanner, (ROOT, *truth.case.seed, 2), bodies)
-            measurement = load_measurement(Path(folder))
-        (read,) = measurement.fit
-        return replace(measurement, conditions=(as_suggested(read, asked),))
+            measurement = load_measurement(Path(folder), follow_up=True)
+        return replace(measurement, conditions=tuple(as_suggested(read, asked) for read in measurement.fit))
 
     def measured(
         self, truth: Truth, conditions: Sequence[Condition], occasion: str = "", pours: int = REPLICATES

@@ -28,7 +28,7 @@ def diagnose(
     scheduler: str = SCHEDULER,
     seed: int = typer.Option(0, min=0, help="Seed of the pours; another seed gives other pours."),
     follow_up: Path | None = typer.Option(
-        None, "--follow-up", metavar="DIR", help="Completed folder OUT/next of an ambiguous diagnosis."
+        None, "--follow-up", metavar="DIR", help="Completed folder OUT/next of a diagnosis."
     ),
     given: Path | None = typer.Option(
         None,
@@ -36,7 +36,7 @@ def diagnose(
         help="Folder of a finished diagnosis: include its effect in the model and look for further ones.",
     ),
     plan_next: bool = typer.Option(
-        True, "--next/--no-next", help="If the answer is ambiguous, simulate what could be measured next."
+        True, "--next/--no-next", help="Look for what to measure next; simulated if the answer is ambiguous."
     ),
     author: str = AUTHOR,
     notes: str = NOTES,

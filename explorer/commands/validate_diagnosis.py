@@ -33,7 +33,7 @@ def validate_diagnosis(
     ),
     wide: bool = typer.Option(False, "--wide", help="Data sets with effects of 4 to 40 σ, for development."),
     follow_up: bool = typer.Option(
-        True, "--follow-up/--no-follow-up", help="Carry out the experiment requested by an ambiguous answer."
+        True, "--follow-up/--no-follow-up", help="Carry out the experiment that an answer asks for."
     ),
     store: Path | None = STORE,
     threads: int | None = typer.Option(

@@ -7,7 +7,7 @@ like any other, its values empty. Lines of comments and observables that were no
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,7 +56,7 @@ class AskedBody:
 
 @dataclass(frozen=True)
 class FollowUpTables:
-    """What the follow-up in ``folder`` asks for in its one condition, and what is filled in."""
+    """What the follow-up in ``folder`` asks for, and what is filled in. ``condition``: "" where nothing is poured."""
 
     folder: Path
     condition: str
@@ -80,25 +80,31 @@ class FollowUpTables:
 def read_follow_up(folder: Path) -> FollowUpTables:
     """The tables in ``folder``. Raises CommandError or MeasurementError, in one line, where they are none."""
     name, pours, bodies = _files(folder)
-    of_pours = _table(pours, COLUMNS, _is_number)
-    found: dict[tuple[str, str], dict[int, str]] = {}
-    most = 0
-    for _, cells in of_pours.rows[1:]:
-        if _is_number(cells):
-            place = of_pours.plain(cells[2]) if len(cells) > 2 else ""
-            unit = cells[4] if len(cells) > 4 and cells[3] else ""
-            value = of_pours.plain(cells[3]) + unit if len(cells) > 3 else ""
-            found.setdefault((cells[1], place), {})[int(cells[0])] = value
-            most = max(most, int(cells[0]))
-    numbers = (AskedNumber(*key, tuple(of.get(k, "") for k in range(1, most + 1))) for key, of in found.items())
     weighed: list[AskedBody] = []
     if bodies is not None:
         of_bodies = _table(bodies, BODY_COLUMNS, _is_body)
         for _, cells in of_bodies.rows[1:]:
             body, quantity, unit, mean, error = (*cells, "", "")[:5]
             weighed.append(AskedBody(body, quantity, unit, of_bodies.plain(mean), of_bodies.plain(error)))
+    if pours is None:
+        return FollowUpTables(folder, name, (), tuple(weighed), frozenset())
     scans = scan_files(folder, [name])[0][name]
-    return FollowUpTables(folder, name, tuple(numbers), tuple(weighed), frozenset(scans))
+    return FollowUpTables(folder, name, tuple(_numbers(pours)), tuple(weighed), frozenset(scans))
+
+
+def _numbers(path: Path) -> Iterator[AskedNumber]:
+    table = _table(path, COLUMNS, _is_number)
+    found: dict[tuple[str, str], dict[int, str]] = {}
+    most = 0
+    for _, cells in table.rows[1:]:
+        if _is_number(cells):
+            place = table.plain(cells[2]) if len(cells) > 2 else ""
+            unit = cells[4] if len(cells) > 4 and cells[3] else ""
+            value = table.plain(cells[3]) + unit if len(cells) > 3 else ""
+            found.setdefault((cells[1], place), {})[int(cells[0])] = value
+            most = max(most, int(cells[0]))
+    for key, of in found.items():
+        yield AskedNumber(*key, tuple(of.get(k, "") for k in range(1, most + 1)))
 
 
 def write_numbers(folder: Path, numbers: Sequence[AskedNumber]) -> None:
@@ -107,6 +113,8 @@ def write_numbers(folder: Path, numbers: Sequence[AskedNumber]) -> None:
     A value is a number in SI, or one with a unit, as 24.7mm. Raises CommandError for another, with nothing changed.
     """
     _, path, _ = _files(folder)
+    if path is None:
+        raise CommandError(f"{folder / FILE}: condition: is missing; allowed: one, with its name and its table")
     entered: dict[tuple[str, str, int], str] = {}
     for row in numbers:
         known = named(row.observable)
@@ -191,10 +199,12 @@ def take_filled(folder: Path, suggestion: Suggestion, name: str, content: bytes,
 # The files
 
 
-def _files(folder: Path) -> tuple[str, Path, Path | None]:
-    """Name and table of the one condition, and the table of single bodies if there is one."""
+def _files(folder: Path) -> tuple[str, Path | None, Path | None]:
+    """Name and table of the one condition, and the table of single bodies; one of both may be missing."""
     table = read_toml(folder / FILE)
     conditions, bodies = table.get("condition"), table.get("bodies")
+    if conditions is None and bodies is not None:
+        return "", None, folder / own_path(str(bodies))
     one = conditions[0] if isinstance(conditions, list) and len(conditions) == 1 else None
     if not isinstance(one, dict) or not {"name", "data"} <= set(one):
         raise CommandError(f"{folder / FILE}: condition: allowed: one, with its name and its table under data")

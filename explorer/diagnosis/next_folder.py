@@ -1,7 +1,8 @@
-"""What to measure next, as a folder that a laboratory fills in: ``OUT/next`` of an ambiguous diagnosis, and back.
+"""What to measure next, as a folder that a laboratory fills in: ``OUT/next`` of a diagnosis, and back.
 
 measurement.toml, <name>.csv, scans/    a measured data set (`doe.measurement`) of one condition, without its values
-bodies.csv                              what to measure of single bodies, where that tells the answers apart
+bodies.csv                              what to measure of single bodies, where that tells the answers apart; alone,
+                                        without a condition, where an answer is given and they can check it
 README.md, setup.svg                    what to set otherwise, in words and to scale
 follow_up.json                          which answers the pours are to tell apart
 """
@@ -90,39 +91,61 @@ def write_next(
 
     Raises CommandError in one line for a folder that is not empty, and for a change that no condition can state.
     """
+    with appearing(folder, option="") as made:
+        if suggestion.bodies:
+            write_whole(made / BODIES, _empty_bodies(suggestion.bodies))
+        if suggestion.pours:
+            readme = _write_pours(made, folder, source, measurement, suggestion, given, taken)
+        else:
+            table = read_toml(source / FILE)
+            stated = next(one for one in table["condition"] if one["name"] == suggestion.condition)
+            material = copied_material(str(stated.get("material", table["material"])), source, made)
+            title = f"{measurement.title or source.name}: {suggestion.experiment.name}"
+            top = {"format": 1, "title": title, "material": material, "bodies": BODIES}
+            write_whole(made / FILE, measurement_toml(top))
+            readme = _readme_of_bodies(folder, source, measurement, suggestion, given)
+        write_whole(made / "README.md", readme)
+        order = {"schema": SCHEMA, "rivals": suggestion.rivals, "change": suggestion.experiment.name}
+        order |= {"values": suggestion.values, "turned": suggestion.turned, "condition": suggestion.condition}
+        order |= {"source": str(source.absolute())}
+        write_whole(made / ORDER, json.dumps(plain(order), ensure_ascii=False, indent=1) + "\n")
+
+
+def _write_pours(
+    made: Path,
+    folder: Path,
+    source: Path,
+    measurement: Measurement,
+    suggestion: Suggestion,
+    given: Path | None,
+    taken: Sequence[str],
+) -> str:
+    """Write the condition to be poured into ``made``, which will be ``folder``; returns its README."""
     # It brings the solver's kernels along; whoever only writes a measurement's file needs none.
     from doe.diagnose.candidate_experiments import as_suggested
 
     table = read_toml(source / FILE)
     condition = next(one for one in measurement.conditions if one.name == suggestion.condition)
     stated = next(one for one in table["condition"] if one["name"] == condition.name)
-    name, change = _free_name(suggestion, measurement, taken), suggestion.experiment.name
+    name = _free_name(suggestion, measurement, taken)
     changed = as_suggested(condition, suggestion).scene
     entry = _changed_entry(stated, name, measurement, suggestion, changed)
-    title = f"{measurement.title or source.name}: follow-up, {change}"
+    title = f"{measurement.title or source.name}: follow-up, {suggestion.experiment.name}"
     drawing, scanned = setup_svg(changed, suggestion.values), any(one.surfaces for one in measurement.conditions)
-    with appearing(folder, option="") as made:
-        material = copied_material(str(stated.get("material", table["material"])), source, made)
-        top = {"format": 1, "title": title, "material": material}
-        tables = {"parameters": _parameters(table, measurement), "uncertainty": _uncertainty(table, condition)}
-        if suggestion.bodies:
-            top["bodies"] = BODIES
-            write_whole(made / BODIES, _empty_bodies(suggestion.bodies))
-        write_whole(made / FILE, measurement_toml(top, tables, entry))
-        write_whole(made / f"{name}.csv", _empty_table(condition, suggestion.pours))
-        if scanned:
-            (made / "scans").mkdir()
-            files = f"{name}_1.ply … {name}_{suggestion.pours}.ply"
-            unit = f"in metres, or with unit under [condition.scan] in {FILE}"
-            told = f"A scan of each pile: {files} (or .stl, .xyz, .npz, .tif), {unit}.\n"
-            write_whole(made / "scans/README.txt", told)
-        if drawing:
-            write_whole(made / "setup.svg", drawing)
-        readme = _readme(folder, source, measurement, suggestion, name, given, bool(drawing), scanned)
-        write_whole(made / "README.md", readme)
-        order = {"schema": SCHEMA, "rivals": suggestion.rivals, "change": change, "values": suggestion.values}
-        order |= {"turned": suggestion.turned, "condition": condition.name, "source": str(source.absolute())}
-        write_whole(made / ORDER, json.dumps(plain(order), ensure_ascii=False, indent=1) + "\n")
+    material = copied_material(str(stated.get("material", table["material"])), source, made)
+    top = {"format": 1, "title": title, "material": material} | ({"bodies": BODIES} if suggestion.bodies else {})
+    tables = {"parameters": _parameters(table, measurement), "uncertainty": _uncertainty(table, condition)}
+    write_whole(made / FILE, measurement_toml(top, tables, entry))
+    write_whole(made / f"{name}.csv", _empty_table(condition, suggestion.pours))
+    if scanned:
+        (made / "scans").mkdir()
+        files = f"{name}_1.ply … {name}_{suggestion.pours}.ply"
+        unit = f"in metres, or with unit under [condition.scan] in {FILE}"
+        told = f"A scan of each pile: {files} (or .stl, .xyz, .npz, .tif), {unit}.\n"
+        write_whole(made / "scans/README.txt", told)
+    if drawing:
+        write_whole(made / "setup.svg", drawing)
+    return _readme(folder, source, measurement, suggestion, name, given, bool(drawing), scanned)
 
 
 def asks_for(folder: Path, suggestion: Suggestion) -> bool:
@@ -141,7 +164,13 @@ def read_next(folder: Path) -> NextFolder:
     """
     rivals, change = _order(folder)
     try:
-        return NextFolder(rivals, change, load_measurement(folder))
+        measurement = load_measurement(folder, follow_up=True)
+        if not measurement.conditions and not measurement.bodies:
+            raise CommandError(
+                f"{folder / BODIES}: mean: none is filled in yet; remove the # from a row and enter mean and standard "
+                "error"
+            )
+        return NextFolder(rivals, change, measurement)
     except MeasurementError:
         for table in sorted(folder.glob("*.csv")):
             if table.name != BODIES and not _holds_value(table):
@@ -298,11 +327,20 @@ def _named_files(table: Settings) -> Iterator[tuple[str, bool]]:
         yield str(table["rig"]["mesh"]), False
 
 
-def measurement_toml(top: Mapping[str, Any], tables: Mapping[str, Any], entry: Mapping[str, Any]) -> str:
-    """measurement.toml of the keys ``top``, further ``tables`` and the one condition ``entry``."""
-    parts = {"": top} | {f"[{name}]\n": table for name, table in tables.items() if table}
+def measurement_toml(
+    top: Mapping[str, Any], tables: Mapping[str, Any] | None = None, entry: Mapping[str, Any] | None = None
+) -> str:
+    """measurement.toml of the keys ``top``, further ``tables`` and the one condition ``entry``, if there is one."""
+    parts = {"": top} | {f"[{name}]\n": table for name, table in (tables or {}).items() if table}
+    if entry is None:
+        return _toml(parts)
     parts["[[condition]]\n"] = {key: item for key, item in entry.items() if not isinstance(item, dict)}
     parts |= {f"[condition.{toml_key(key)}]\n": item for key, item in entry.items() if isinstance(item, dict)}
+    return _toml(parts)
+
+
+def _toml(parts: Mapping[str, Mapping[str, Any]]) -> str:
+    """Tables under their heads."""
     text = "\n".join(
         head + "".join(f"{toml_key(key)} = {toml_value(item)}\n" for key, item in table.items())
         for head, table in parts.items()
@@ -367,21 +405,7 @@ def _readme(
     more = f", and a scan of each pile as `scans/{name}_1.ply` and so on" if scanned else ""
     if any(one.origin == "photographs" for one in condition.observations):
         more += f', or name photographs under `[[condition]]` in `{FILE}`: `images = ["…"]`'
-    command = ["explorer", "diagnose", str(source.absolute()), "--follow-up", str(folder.absolute())]
-    command += [] if given is None else ["--given", str(given.absolute())]
-    # The folder of the first diagnosis is not empty any more.
-    command += ["--out", f"{folder.absolute().parent}_with_follow_up"]
-    weighed = ""
-    if suggestion.bodies:
-        kinds = [f"- {body}, {QUANTITIES[one].words}: {QUANTITIES[one].how}" for body, one in suggestion.bodies]
-        weighed = f"""## What to measure of single bodies
-
-It takes minutes, and these answers differ in it. Write into `{BODIES}` the mean and its standard error (from the
-scatter of lots or bodies, and what the instrument may be off).
-
-{_lines(kinds)}
-
-"""
+    weighed = _what_of_bodies(suggestion, "these answers differ in it") + "\n" if suggestion.bodies else ""
     return f"""# To be measured next: {experiment.name}
 
 The data of {title} leave {len(suggestion.rivals)} answers: {answers}. These pours are to tell them apart.
@@ -412,7 +436,46 @@ Of the changes that this rig allows, none has a better chance. By their nature, 
 `{name}.csv`: take the `# ` off each row that you measured and write the value behind its last comma{more}.
 The table needs two pours or more. If a setting came out otherwise than asked, correct it in `{FILE}`.
 
-## The command that takes it
+{_command(folder, source, given)}"""
+
+
+def _readme_of_bodies(
+    folder: Path, source: Path, measurement: Measurement, suggestion: Suggestion, given: Path | None
+) -> str:
+    title = code(" ".join((measurement.title or source.name).split()))
+    answer, *others = (spelled(label) for label in suggestion.rivals)
+    return f"""# To be checked: {answer}
+
+The data of {title} give this answer. No further pour is asked for: single bodies tell it from
+{enumeration(others)}.
+
+{_what_of_bodies(suggestion, "these answers differ in it")}
+## What it will decide
+
+These numbers give the right answer with a chance of **{percent(suggestion.experiment.chance)}**, if it is one of these.
+Something that is in no library falls out as well: it shifts the piles as a named effect would, and leaves single bodies
+as they are declared.
+
+{_command(folder, source, given)}"""
+
+
+def _what_of_bodies(suggestion: Suggestion, why: str) -> str:
+    kinds = [f"- {body}, {QUANTITIES[one].words}: {QUANTITIES[one].how}" for body, one in suggestion.bodies]
+    return f"""## What to measure of single bodies
+
+It takes minutes, and {why}. Write into `{BODIES}` the mean and its standard error (from the
+scatter of lots or bodies, and what the instrument may be off), and take the `# ` off that row.
+
+{_lines(kinds)}
+"""
+
+
+def _command(folder: Path, source: Path, given: Path | None) -> str:
+    command = ["explorer", "diagnose", str(source.absolute()), "--follow-up", str(folder.absolute())]
+    command += [] if given is None else ["--given", str(given.absolute())]
+    # The folder of the first diagnosis is not empty any more.
+    command += ["--out", f"{folder.absolute().parent}_with_follow_up"]
+    return f"""## The command that takes it
 
     {shlex.join(command)}
 

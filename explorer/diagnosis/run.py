@@ -95,7 +95,7 @@ class DiagnoseOrder:
     record: Path | None = None
     """New file for the answer as a recording."""
     plan_next: bool = True
-    """Whether an ambiguous answer pours what could be measured next."""
+    """Whether what could be measured next is looked for."""
     scheduler: str = ""
     """Address of a Dask scheduler whose workers pour; "" for processes of this machine."""
 

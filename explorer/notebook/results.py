@@ -127,11 +127,11 @@ def diagnose(
     seed
         Of the pours.
     follow_up
-        The folder ``next`` that an ambiguous answer left in its ``out``, filled in.
+        The folder ``next`` that an answer left in its ``out``, filled in.
     given
         The ``out`` of a finished diagnosis: with its effect in the model, what else is missing?
     plan_next
-        Whether an ambiguous answer pours what could be measured next.
+        Whether what could be measured next is looked for, and poured if the answer is ambiguous.
     apply
         Also write the corrected material, ``corrected.toml``.
 

@@ -72,12 +72,15 @@ def banner(result: DiagnosisResult) -> Banner:
 def _what_next(result: DiagnosisResult) -> str:
     match result.kind:
         case "no_missing_effect":
-            return "Use the calibrated model; the section on what could have been seen says what may still hide."
+            return (
+                "Use the calibrated model; the section on what could have been seen says what may still hide."
+                f"{_check(result)}"
+            )
         case "effect" | "effects":
             return (
                 f"Pour the corrected material, and calibrate it with its study: `{CORRECTED}` and "
                 f"`{CORRECTED_STUDY}`, which `explorer diagnose … --apply` writes beside this report. What else is "
-                f"missing beside it, {_asking_further(result)} asks."
+                f"missing beside it, {_asking_further(result)} asks.{_check(result)}"
             )
         case "ambiguous":
             return f"{follow_up_text(result)} `explorer diagnose … --follow-up` takes them."
@@ -92,6 +95,11 @@ def _what_next(result: DiagnosisResult) -> str:
                 "Pour the same set-up again, and check scale, units and the set-up before looking for new physics."
                 + further
             )
+
+
+def _check(result: DiagnosisResult) -> str:
+    """What of single bodies would check an answer that is given; empty where nothing would."""
+    return f" {follow_up_text(result)} `explorer diagnose … --follow-up` takes them." if result.next_experiment else ""
 
 
 def _asking_further(result: DiagnosisResult) -> str:
@@ -338,17 +346,20 @@ def _of_bounds(row: EffectRow) -> list[str]:
 
 
 def follow_up_text(result: DiagnosisResult) -> str:
-    """What would tell the answers apart that are left, and with which chance."""
+    """What would tell the answers apart that are left, or check the one that is given, and with which chance."""
     if not result.order.plan_next:
         return "What could tell them apart was not looked for (`--no-next`)."
     if not result.next_experiment:
         return "No change of the rig that was tried would tell them apart."
     first = result.next_experiment[0]
     best, pours = first.experiment, first.pours
+    numbers = enumeration(list(dict.fromkeys(quantity.replace("_", " ") for _, quantity in first.bodies)))
+    if not pours:
+        others = enumeration([spelled(label) for label in first.rivals[1:]])
+        return f"To check it, measure {numbers} of single bodies, which tell it from {others}."
     what = f"{pours} pours of {code(best.name)}"
     if first.bodies:
-        numbers = dict.fromkeys(quantity.replace("_", " ") for _, quantity in first.bodies)
-        what += f", with {enumeration(list(numbers))} of single bodies,"
+        what += f", with {numbers} of single bodies,"
     text = f"{what} would single out the right one with a chance of {percent(best.chance)}."
     return f"{text} {FOLLOW_UPS_SO_FAR}"
 
@@ -511,6 +522,7 @@ def _ranked(result: DiagnosisResult) -> list[Block]:
             f"{fixed(row.experiment.separation)} σ",
         )
         for row in result.next_experiment
+        if row.pours
     )
     if not rows:
         return []

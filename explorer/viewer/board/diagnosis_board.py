@@ -9,7 +9,7 @@ from explorer.background.command_process import CommandStatus
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.project.steps import Room
 from explorer.report.content import Banner, Table
-from explorer.report.diagnosis.answer import banner
+from explorer.report.diagnosis.answer import banner, follow_up_text
 from explorer.report.diagnosis.charts import diagnosis_plots, likely, map_chart
 from explorer.report.diagnosis.wording import chance, feature_label, feature_value, spelled
 from explorer.report.study_charts import Plot
@@ -70,8 +70,14 @@ def _pressed(result: DiagnosisResult) -> Banner:
         return replace(
             banner(result), then="Pour and measure that, fill it in under Follow-up, above, and answer with it."
         )
-    then = " ".join(["Pour the corrected model, and calibrate it.", *further])
-    return replace(banner(result), then=then) if result.added else banner(result)
+    check = [f"{follow_up_text(result)} Fill that in under Follow-up, above."] if result.next_experiment else []
+    if result.added:
+        then = " ".join(["Pour the corrected model, and calibrate it.", *further, *check])
+    elif check:
+        then = f"Use the calibrated model. {check[0]}"
+    else:
+        return banner(result)
+    return replace(banner(result), then=then)
 
 
 def _answers(result: DiagnosisResult) -> BoardTable:

@@ -346,7 +346,7 @@ def angle_line(mean: float, sd: float) -> str:
 
 
 class FollowUp:
-    """What an answer that is left open asks for: taken along, filled in here or elsewhere, and answered with."""
+    """What an answer asks for that is left open or can be checked: taken along, filled in, and answered with."""
 
     def __init__(self, page: PageContext, begin: Callable[[DiagnosisResult, Path], None]) -> None:
         gui, post = page.server.gui, page.post
@@ -384,7 +384,7 @@ class FollowUp:
 
     def offer(self, result: DiagnosisResult | None, folder: Path | None) -> None:
         """Show what ``result`` in ``folder`` asks for, and how much of it is filled in."""
-        asked = None if folder is None or result is None or result.kind != "ambiguous" else folder / NEXT
+        asked = None if folder is None or result is None or not result.next_experiment else folder / NEXT
         self._result, self._folder = result, asked if asked and (asked / ORDER).is_file() else None
         if self._place.visible != (self._folder is not None):
             self._place.visible = self._folder is not None
@@ -441,6 +441,9 @@ def _follow_up_markdown(result: DiagnosisResult, folder: Path) -> str:
         return escaped(str(error))
     cells = tables.cells
     scans = f", {len(tables.scanned)} of {asked.pours} scans" if (folder / "scans").is_dir() else ""
+    done = f"Filled in: {sum(map(bool, cells))} of {len(cells)} values{scans}."
+    if not asked.pours:
+        return f"{follow_up_text(result)}\n\n{done}"
     changes = [f"{parameter_label(path)} **{parameter_value(path, new)}**" for path, new in asked.values.items()]
     if asked.turned:
         changes.append("the whole rig **turned by 180° on its bench**")
@@ -448,7 +451,7 @@ def _follow_up_markdown(result: DiagnosisResult, folder: Path) -> str:
         f"{follow_up_text(result)}\n\n"
         f"Otherwise than in condition {code(asked.condition)}: {enumeration(changes) or 'nothing'}. "
         "All else as before.\n\n"
-        f"Filled in: {sum(map(bool, cells))} of {len(cells)} values{scans}."
+        f"{done}"
     )
 
 

@@ -71,8 +71,9 @@ def _build(folder: Callable[[], Path | None], post: Post) -> None:
     if tables.bodies:
         table_heading(f"{TITLE}: {OF_BODIES}", HOW_OF_BODIES)
         table_to_edit(body_columns(), body_rows(tables), bodies, post, height=f"{6 + 3 * len(tables.bodies)}rem")
-    table_heading(f"{TITLE}: {OF_POURS}", HOW)
-    table_to_edit(number_columns(tables), number_rows(tables), pours, post)
+    if tables.numbers:
+        table_heading(f"{TITLE}: {OF_POURS}", HOW)
+        table_to_edit(number_columns(tables), number_rows(tables), pours, post)
 
 
 def _saved(cells: Sequence[str]) -> str:

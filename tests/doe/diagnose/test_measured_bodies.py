@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,9 +12,12 @@ from doe.declared.bodies import BodyEvidence, body_evidence, wanted_bodies
 from doe.declared.model import declare
 from doe.diagnose.candidate_experiments import _with_bodies
 from doe.diagnose.compared_features import MeasuredFeatures, weighed
+from doe.diagnose.diagnosis import checked_by_bodies
 from doe.diagnose.emulator import Lessons, Way
-from doe.diagnose.next_experiment import CandidateExperiment, Prediction, chance_of_an_answer
-from doe.diagnose.result import Amplitude
+from doe.diagnose.next_experiment import DRAWS, CandidateExperiment, Prediction, chance_of_an_answer
+from doe.diagnose.posterior import TEMPERATURE
+from doe.diagnose.result import BODIES_ALONE, Amplitude
+from doe.diagnose.verdict import THRESHOLD
 from doe.measurement import load_measurement
 from doe.measurement.bodies import MeasuredBody
 from solver import EFFECTS
@@ -84,11 +88,56 @@ def test_a_follow_up_that_asks_for_bodies_knows_what_they_will_tell(data):
     item = CandidateExperiment("as it is", dict.fromkeys(ALIKE, nothing))
     answers = [[("density_error", 0.1, 1e-6)], [("rolling_resistance", 0.1, 1e-6)]]
     bodies = wanted_bodies(data, declare(data, tuple(EFFECTS)), answers)
-    found = compared(None).posterior
-    known = replace(
-        found.fits["density_error"], amplitudes=(Amplitude("density_error", 0, 0.1, 0.1 - 1e-6, 0.1 + 1e-6, False),)
-    )
-    found = replace(found, fits=found.fits | {"density_error": known})
+    found = known(compared(None).posterior)
     weights = dict.fromkeys(ALIKE, 0.5)
     assert chance_of_an_answer(item, weights, 6) == 0.0
     assert chance_of_an_answer(_with_bodies(item, found, bodies), weights, 6) > 0.99
+
+
+def known(found):
+    """``found`` with bodies heavier by a tenth as what a density error comes to."""
+    amplitude = Amplitude("density_error", 0, 0.1, 0.1 - 1e-6, 0.1 + 1e-6, False)
+    return replace(
+        found, fits=found.fits | {"density_error": replace(found.fits["density_error"], amplitudes=(amplitude,))}
+    )
+
+
+def test_numbers_without_a_pour_find_the_answer_as_often_as_the_normal_distribution_has_it():
+    """Two answers d standard errors apart: odds exp(T (d²/2 + d z)) for the true one, z ~ N(0, 1)."""
+    for d in (1.5, 3.0, 5.0):
+        places = {"a": np.zeros(1), "b": np.array([d])}
+        item = CandidateExperiment(BODIES_ALONE, {name: Prediction(x, np.eye(1)) for name, x in places.items()})
+        needed = math.log(THRESHOLD / (1.0 - THRESHOLD))
+        wanted = stats.norm.cdf(0.5 * d - needed / (TEMPERATURE * d))
+        found = chance_of_an_answer(item, dict.fromkeys(places, 0.5), math.inf)
+        assert found == pytest.approx(wanted, abs=4.0 * math.sqrt(0.25 / (2 * DRAWS))), d
+
+
+@pytest.mark.parametrize(
+    ("kind", "rivals"),
+    [
+        ("effect:density_error", ("density_error", "rolling_resistance", "base")),
+        ("effect:rolling_resistance", ("rolling_resistance", "density_error", "base")),
+        ("no_missing_effect", ("base", "density_error", "rolling_resistance")),
+    ],
+)
+def test_an_answer_that_is_given_is_checked_by_the_bodies_in_which_it_differs(data, kind, rivals):
+    found, declared = known(compared(None).posterior), declare(data, tuple(EFFECTS))
+    names = () if kind == "no_missing_effect" else (kind.partition(":")[2],)
+    checks = checked_by_bodies(SimpleNamespace(kind=kind, names=names), found, declared, data)
+    (check,) = checks.suggestions
+    assert (check.bodies, check.pours, check.values) == ((("bead", "mass"),), 0, {})
+    assert check.rivals[0] == rivals[0]
+    assert set(check.rivals) == set(rivals)
+    rows = weighed_bodies(data, 1.0).rows
+    assert checked_by_bodies(
+        SimpleNamespace(kind=kind, names=names), found, declared, replace(data, bodies=rows)
+    ) == replace(checks, suggestions=())
+
+
+def test_no_body_checks_what_no_number_shows_nor_what_nothing_explains(data):
+    found, declared = known(compared(None).posterior), declare(data, tuple(EFFECTS))
+    alone = replace(found, effects={"rolling_resistance": 0.99, "density_error": 0.005})
+    for kind, names in (("effect:rolling_resistance", ("rolling_resistance",)), ("unexplained", ())):
+        checks = checked_by_bodies(SimpleNamespace(kind=kind, names=names), alone, declared, data)
+        assert checks.suggestions == ()

@@ -4,12 +4,14 @@ The whole of it in the small, answers included, is slow (`test_campaign.py`).
 """
 
 from contextlib import closing
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import solver
 from doe.declared.budget import Budget
+from doe.diagnose.result import BODIES_ALONE, RankedExperiment, Suggestion
 from doe.errors import MeasurementError
 from doe.measurement import load_measurement
 from doe.measurement.condition_table import in_rig
@@ -22,7 +24,7 @@ from doe.validation.scanner import Scanner
 from doe.validation.sets import SetRow, append_rows
 from doe.validation.truth import REPLICATES, Case, Truth
 from doe.validation.work_place import WorkPlace
-from solver import AssetNotFoundError, PlateTest, actual, with_values
+from solver import AssetNotFoundError, PlateTest, actual, value, with_values
 from tests.doe.validation.small_model import small_laboratory
 
 
@@ -199,3 +201,24 @@ def test_what_was_asked_of_bodies_is_handed_out(tmp_path):
     laboratory.write(tmp_path, {name: pours}, None, table)
     (row,) = load_measurement(tmp_path).bodies
     assert row.mean == pytest.approx(laboratory.declared.scene.bodies[0].mass, rel=0.02)
+
+
+def test_bodies_are_measured_without_a_pour_where_they_alone_are_asked_for():
+    laboratory, case = read_laboratory(TREFOILS), Case(9, 0, "effect", "density_error", 6.0)
+    declared = laboratory.declared
+    theta = tuple(value(declared.scene, parameter.path) for parameter in declared.parameters)
+    truth = Truth(case, theta, (("density_error", (0.2,)),))
+    answers = Answers(laboratory, None, SimpleNamespace(store=None, pours=None), Budget())
+    asked = Suggestion(
+        RankedExperiment(BODIES_ALONE, 0.9, 3.0),
+        {},
+        declared.fit[0].name,
+        ("density_error", "base"),
+        (),
+        0,
+        bodies=(("trefoil", "mass"),),
+    )
+    found = answers.followed_up(truth, asked, None)
+    assert found.conditions == ()
+    (row,) = found.bodies
+    assert row.mean == pytest.approx(1.2 * declared.scene.bodies[0].mass, rel=0.02)

@@ -30,7 +30,7 @@ from explorer.viewer.tables.follow_up_page import (
     number_rows,
 )
 from solver import ParameterError
-from tests.explorer.diagnosis.test_next_folder import SOURCE, TWICE, suggestion, values_of
+from tests.explorer.diagnosis.test_next_folder import CHECK, SOURCE, TWICE, suggestion, values_of
 
 BODIES = (("trefoil", "mass"), ("trefoil", "length"))
 ANGLE, HEIGHT = "angle_of_repose_deg", "apex_height_m"
@@ -231,6 +231,22 @@ def test_an_archive_that_was_another_follow_up_s_is_refused_and_none_is_a_data_s
         take_filled(folder, replace(asked, rivals=("air_drag", "base")), "back.zip", packed(folder), uploads)
     assert contents(folder) == before
     assert kept_measurements(uploads) == {}
+
+
+def test_a_check_by_bodies_has_their_table_and_no_other(tmp_path, measured):
+    folder = tmp_path / "next"
+    write_next(folder, SOURCE, measured, CHECK)
+    tables = read_follow_up(folder)
+    assert (tables.condition, tables.numbers, tables.pours) == ("", (), 0)
+    assert [one.quantity for one in tables.bodies] == ["mass", "length_spread"]
+    with pytest.raises(CommandError, match="condition: is missing"):
+        write_numbers(folder, ())
+    write_bodies(folder, [replace(tables.bodies[0], mean="0.115", standard_error="0.001"), tables.bodies[1]])
+    assert len(read_next(folder).measurement.bodies) == 1
+    sent = packed(folder)
+    write_bodies(folder, tables.bodies)
+    take_filled(folder, CHECK, "back.zip", sent, tmp_path / "uploads")
+    assert read_follow_up(folder).bodies[0].mean == "0.115"
 
 
 # On the page

@@ -11,8 +11,9 @@ import pytest
 import trimesh
 
 from doe.declared.set_ups import CHANGES, TURNED, feasible
+from doe.diagnose.diagnosis import joined
 from doe.diagnose.next_experiment import RankedExperiment
-from doe.diagnose.result import Suggestion
+from doe.diagnose.result import BODIES_ALONE, Suggestion
 from doe.errors import MeasurementError
 from doe.measurement.load import load_measurement
 from explorer.diagnosis.next_folder import CHANGED, asks_for, read_next, setup_svg, write_next
@@ -214,6 +215,38 @@ def test_single_bodies_are_asked_for_and_may_be_left_out(tmp_path, measured):
     bodies.write_text(bodies.read_text().replace("0.21,0.002", "0.21,"))
     with pytest.raises(MeasurementError, match=r"bodies\.csv:\d+: standard_error: "):
         read_next(folder)
+
+
+CHECK = Suggestion(
+    RankedExperiment(BODIES_ALONE, 0.91, 2.5), {}, "fit", ("density_error", "base"), (), 0, bodies=BODIES
+)
+
+
+def test_a_check_asks_for_bodies_and_for_no_pour(tmp_path, measured):
+    folder = tmp_path / "next"
+    write_next(folder, SOURCE, measured, CHECK)
+    assert not list(folder.glob("*.svg")) + list(folder.glob("scans"))
+    text = (folder / "README.md").read_text()
+    assert text.startswith("# To be checked: `density_error`\n")
+    for part in ("single bodies tell it from\nthe declared model.", "91 %", "mean mass of one body: count fifty"):
+        assert part in text
+    assert f"explorer diagnose {SOURCE.absolute()} --follow-up {folder} " in text
+    assert asks_for(folder, CHECK)
+    table = folder / "bodies.csv"
+    with pytest.raises(CommandError, match=r"bodies\.csv: mean: none is filled in yet"):
+        read_next(folder)
+    table.write_text(table.read_text().replace("# trefoil,mass,g,,", "trefoil,mass,g,0.21,0.002"))
+    found = read_next(folder)
+    assert found.measurement.conditions == ()
+    both = joined(measured, found.measurement)
+    assert both.conditions == measured.conditions
+    assert [(one.quantity, one.mean) for one in both.bodies] == [("mass", pytest.approx(2.1e-4))]
+
+
+def test_bodies_alone_are_no_data_set_to_be_diagnosed(tmp_path, measured):
+    write_next(tmp_path / "next", SOURCE, measured, CHECK)
+    with pytest.raises(MeasurementError, match=r"measurement\.toml: condition\.role: none of 0 conditions"):
+        load_measurement(tmp_path / "next")
 
 
 def test_without_bodies_none_are_asked_for(tmp_path, measured):

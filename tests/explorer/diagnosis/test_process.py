@@ -33,7 +33,7 @@ from solver import EFFECTS, AssetNotFoundError, with_values
 from solver.assets import measurement_folder
 from tests.explorer.background.waiting import only_folder, wait_for
 from tests.explorer.diagnosed import result_of_case, typed
-from tests.explorer.diagnosis.test_next_folder import fill
+from tests.explorer.diagnosis.test_next_folder import CHECK, fill
 from tests.explorer.viewer.page_session import PageSession, finished, page_context
 from tests.explorer.viewer.person import Person
 from tests.explorer.viewer.study_panel_at_hand import board_at
@@ -437,6 +437,20 @@ def test_a_diagnosis_that_goes_on_from_another_names_it_and_is_none_to_resume(tm
     assert arguments[arguments.index("--given") + 1] == "results/first"
     # Resumed by its data's name it would be another question.
     assert process.stopped(Question("trefoil_1")) is None
+
+
+def test_an_answer_that_is_given_can_be_checked_on_the_page(room, tmp_path):
+    content = result_of_case("effect")
+    content["next_experiment"] = [CHECK.to_dict()]
+    source = measurement_folder("trefoil_2")
+    write_next(tmp_path / "next", source, load_measurement(source), CHECK)
+    room.found(content)
+    room.show()
+    told = room.person.within("Follow-up")
+    assert "To check it, measure mass and length spread of single bodies" in told.text
+    assert "Filled in: 0 of 4 values." in told.text
+    assert "under Follow-up" in board(room.panel)["banner"]["then"]
+    assert "mean: none is filled in yet" in room.person.press("Answer with the follow-up")
 
 
 def test_a_follow_up_is_filled_in_and_answered_with_on_the_page(room, tmp_path):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from doe.diagnose.result import BODIES_ALONE
 from doe.validation.sets import read_rows
 from explorer.diagnosis.run import DiagnoseOrder, result_of
 from explorer.report.diagnosis import wording
@@ -105,6 +106,21 @@ def test_a_follow_up_that_asks_for_bodies_says_so(results):
         "6 pours of `half the mass`, with mass and length spread of single bodies, would single out the right one"
         in verdict_sentence(result)
     )
+
+
+@pytest.mark.parametrize("case", ["effect", "nothing"])
+def test_an_answer_that_is_given_says_what_would_check_it(results, case):
+    result = copy.deepcopy(results[case])
+    assert "To check it" not in diagnosis_markdown(result | {"next_experiment": []})
+    experiment = {"name": BODIES_ALONE, "chance": 0.93, "separation": 2.0}
+    told = {"values": {}, "condition": "fit", "levers": [], "pours": 0, "turned": False, "bodies": [["bead", "mass"]]}
+    rivals = ["adhesion_sjkr", "base"] if case == "effect" else ["base", "density_error"]
+    result["next_experiment"] = [{"experiment": experiment, "rivals": rivals, **told}]
+    text = diagnosis_markdown(result)
+    other = "the declared model" if case == "effect" else "`density_error`"
+    assert f"To check it, measure mass of single bodies, which tell it from {other}." in text
+    assert "`explorer diagnose … --follow-up` takes them" in text
+    assert "0 pours" not in text
 
 
 def test_a_declared_model_that_does_not_fit_and_has_no_rival_is_called_so(results):
