@@ -58,6 +58,11 @@ class BodyEvidence:
     effects: tuple[CandidateEffect, ...]
     _shifts: dict[str, PchipInterpolator | None] = field(default_factory=dict)
 
+    @property
+    def asked(self) -> tuple[tuple[str, str], ...]:
+        """Component and quantity of each row."""
+        return tuple((row.body, row.quantity) for row in self.rows)
+
     def log_density(self, label: str, amplitudes: FloatArray, cell: float) -> FloatArray:
         """Log densities (n,) of the numbers, less those of numbers that agree, under "base", an effect, or "a+b".
 

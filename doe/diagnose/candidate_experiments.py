@@ -9,6 +9,7 @@ regression and the axis of a scan leave open is in the covariance.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -18,7 +19,8 @@ import numpy.typing as npt
 from scipy.linalg import block_diag
 
 from doe.analysis.covariance import shrunk_means
-from doe.declared.bodies import Acting, BodyEvidence
+from doe.declared.bodies import Acting, BodyEvidence, wanted_bodies
+from doe.declared.model import Declared
 from doe.declared.points import AS_IT_IS
 from doe.declared.pours import ModelPours
 from doe.declared.set_ups import changed, feasible
@@ -26,11 +28,12 @@ from doe.diagnose.compared_features import usable
 from doe.diagnose.emulator import Emulator, Lessons, emulated, planar_weights
 from doe.diagnose.next_experiment import GIVEN_UP, CandidateExperiment, Prediction, fewest_pours, rank_experiments
 from doe.diagnose.posterior import Posterior
-from doe.diagnose.result import BODIES_ALONE, RankedExperiment, Suggestion
+from doe.diagnose.result import BASE, BODIES_ALONE, UNEXPLAINED, RankedExperiment, Suggestion
 from doe.diagnose.training_pours import TrainingPours, acting
+from doe.diagnose.verdict import Verdict
 from doe.errors import StatisticsError
 from doe.measurement.features import feature_set, offer_of
-from doe.measurement.measurement import Condition
+from doe.measurement.measurement import Condition, Measurement
 from solver import EFFECTS
 
 FloatArray = npt.NDArray[np.float64]
@@ -39,6 +42,8 @@ PoursIn = Callable[[Sequence[Condition]], ModelPours]
 BASE_POURS, POURS, TAUGHT = 12, 4, 14
 """Pours of the base model, and of every direction of an effect that is left, in each set-up of the candidates; and of a
 direction when the data of the chosen one are weighed (six, and a look of eight, at least)."""
+MISTAKEN = 0.01
+"""Probability from which on an answer counts among those that the one given may be mistaken for."""
 INTERVAL = 2.0 * 1.96
 """Standard deviations in a 95 % interval."""
 
@@ -84,7 +89,7 @@ def next_experiment(
     set_ups = [one for one in set_ups if training.possible_in(one.scene)]
     asked = dict.fromkeys(name for label in weights if label != "base" for name in label.split("+"))
     levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in asked)
-    asked_of = () if bodies is None else _asked_of(bodies)
+    asked_of = () if bodies is None else bodies.asked
     ranked: tuple[RankedExperiment, ...] = ()
     planned = run_now = 0
     # Where bodies tell all, no other set-up can gain.
@@ -104,17 +109,23 @@ def next_experiment(
     return CandidateExperiments(tuple(suggestions), run_now)
 
 
-def check_by_bodies(
-    found: Posterior, weights: Mapping[str, float], condition: Condition, bodies: BodyEvidence
-) -> Suggestion:
-    """What ``bodies``, without a pour, would tell of an answer and of what it may be mistaken for: ``weights``."""
-    predictions = {label: Prediction(*bodies.predicted(acting_in(found, label))) for label in weights}
+def checked_by_bodies(
+    verdict: Verdict, found: Posterior, declared: Declared, measurement: Measurement
+) -> tuple[Suggestion, ...]:
+    """What of single bodies tells an answer that is given from what it may be mistaken for; nothing if it is none."""
+    if verdict.kind == UNEXPLAINED:
+        return ()
+    (answer,) = verdict.names or (BASE,)
+    odds = {**found.effects, BASE: max(found.nothing, sys.float_info.min)}
+    others = [label for label, p in odds.items() if label != answer and (p >= MISTAKEN or label == BASE)]
+    weights = {label: odds[label] for label in (answer, *sorted(others, key=lambda one: -odds[one]))}
+    acts = {label: acting_in(found, label) for label in weights}
+    if (bodies := wanted_bodies(measurement, declared, list(acts.values()))) is None:
+        return ()
+    predictions = {label: Prediction(*bodies.predicted(acts[label])) for label in weights}
+    # All noise is in the predictions.
     (ranked,) = rank_experiments([CandidateExperiment(BODIES_ALONE, predictions)], weights, math.inf)
-    return Suggestion(ranked, {}, condition.name, tuple(weights), (), 0, bodies=_asked_of(bodies))
-
-
-def _asked_of(bodies: BodyEvidence) -> tuple[tuple[str, str], ...]:
-    return tuple((row.body, row.quantity) for row in bodies.rows)
+    return (Suggestion(ranked, {}, measurement.fit[0].name, tuple(weights), (), 0, bodies=bodies.asked),)
 
 
 def _items(

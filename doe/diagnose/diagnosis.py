@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -13,11 +13,11 @@ from doe.declared.bodies import body_evidence, wanted_bodies
 from doe.declared.budget import Budget
 from doe.declared.model import Declared, declare
 from doe.declared.pours import ROOT, ModelPours, OnPour
-from doe.diagnose.candidate_experiments import CandidateExperiments, acting_in, check_by_bodies, next_experiment
+from doe.diagnose.candidate_experiments import CandidateExperiments, acting_in, checked_by_bodies, next_experiment
 from doe.diagnose.compared_features import Compared, measured, weighed
 from doe.diagnose.confirm import CONTRADICTED, Confirmed, confirm, held_out, model_of, residual_maps
 from doe.diagnose.posterior import Posterior, gain_by_pours, holds
-from doe.diagnose.result import BASE, NO_EFFECT, UNEXPLAINED, HeldOut, Level, Offered, Suggestion
+from doe.diagnose.result import BASE, NO_EFFECT, HeldOut, Level, Offered, Suggestion
 from doe.diagnose.training_pours import Say, TrainingPours
 from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD, Verdict, candidate, taken_back, verdict_of
 from doe.errors import MeasurementError
@@ -47,8 +47,6 @@ FIRST_OTHER_ROOT = 100
 """Roots of other seeds begin here: below it are those of laboratories and of reference pours."""
 MOST_RIVALS = 4
 """That the next experiment is chosen for."""
-MISTAKEN = 0.01
-"""Probability from which on an answer counts among those that the one given may be mistaken for."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +112,7 @@ def run_diagnosis(
 
     model, everywhere = pours_in(measurement.fit), pours_in(measurement.conditions)
     training = TrainingPours(declared, measurement.fit, model, budget, say)
-    compared = pursued(training, measurement, budget, say, follow_up is not None)
+    compared = pursued(training, measurement, budget, say, follow_up)
     verdict = verdict_of(compared, declared, training.pours, follow_up is not None)
     say(f"verdict: {verdict.kind}")
     confirmed, verdict = concluded(verdict, compared, declared, measurement.conditions, everywhere, say)
@@ -159,14 +157,35 @@ def joined(measurement: Measurement, follow_up: Measurement) -> Measurement:
     return replace(measurement, conditions=conditions, bodies=(*measurement.bodies, *follow_up.bodies))
 
 
-def pursued(training: TrainingPours, measurement: Measurement, budget: Budget, say: Say, followed_up: bool) -> Compared:
-    """Models and data once what is in question has been looked at more closely."""
+def pursued(
+    training: TrainingPours, measurement: Measurement, budget: Budget, say: Say, follow_up: Measurement | None
+) -> Compared:
+    """Models and data once what is in question has been looked at more closely; ``follow_up``: what is in the data."""
     data = [measured(condition) for condition in measurement.fit]
-    bodies = body_evidence(measurement, training.declared)
-    instruments = training.instruments(data)
-    compared = weighed(training.lessons(), training.ways, data, instruments, bodies)
+    instruments, looked = training.instruments(data), set[str]()
+    parts = [measurement]
+    if follow_up is not None and not follow_up.conditions:
+        # What bodies settle needs no look, and yet what taught the answer that they check has to teach the check.
+        parts.insert(0, replace(measurement, bodies=measurement.bodies[: -len(follow_up.bodies)]))
+    for part in parts:
+        bodies = body_evidence(part, training.declared)
+        weigh = partial(weighed, conditions=data, instruments=instruments, bodies=bodies)
+        compared = _settled(training, weigh, budget, say, looked)
+        label, sure = candidate(compared.posterior, follow_up is not None)
+        if sure >= THRESHOLD:
+            training.refine(compared.posterior, label)
+            compared = weigh(training.lessons(), training.ways)
+            say(f"with pours on both sides of its best fit: {odds(compared.posterior)}")
+            compared = compared.refitted(("base", compared.posterior.best[0]))
+    return compared
+
+
+def _settled(
+    training: TrainingPours, weigh: Callable[..., Compared], budget: Budget, say: Say, looked: set[str]
+) -> Compared:
+    """Models and data after closer looks, of which those at the effects ``looked`` have been taken."""
+    compared = weigh(training.lessons(), training.ways)
     say(f"after screening: {odds(compared.posterior)}")
-    looked: set[str] = set()
     held, before = 0, ""
     for _ in range(budget.looks):
         found = compared.posterior
@@ -185,15 +204,8 @@ def pursued(training: TrainingPours, measurement: Measurement, budget: Budget, s
         if not poured:
             break
         looked |= set(poured)
-        compared = weighed(training.lessons(), training.ways, data, instruments, bodies)
+        compared = weigh(training.lessons(), training.ways)
         say(f"after a closer look at {', '.join(poured)}: {odds(compared.posterior)}")
-    label, sure = candidate(compared.posterior, followed_up)
-    if sure >= THRESHOLD:
-        training.refine(compared.posterior, label)
-        compared = weighed(training.lessons(), training.ways, data, instruments, bodies)
-        say(f"with pours on both sides of its best fit: {odds(compared.posterior)}")
-        label = compared.posterior.best[0]
-        return compared.refitted(("base", label))
     return compared
 
 
@@ -255,7 +267,7 @@ def suggested(
     bodies alone where one is given; nothing where it is unexplained.
     """
     if not verdict.kind.startswith("ambiguous"):
-        return checked_by_bodies(verdict, found, training.declared, measurement)
+        return CandidateExperiments(checked_by_bodies(verdict, found, training.declared, measurement), 0)
     weights = {label: found.effects[label] for label in verdict.names[:MOST_RIVALS]}
     if NO_EFFECT in verdict.kind or len(weights) < 2:
         weights[BASE] = found.nothing
@@ -267,23 +279,6 @@ def suggested(
     # It is chosen for the likeliest answers, and told of all that are left.
     left = (*verdict.names, *(label for label in weights if label == BASE))
     return CandidateExperiments(tuple(replace(one, rivals=left) for one in candidates.suggestions), candidates.run_now)
-
-
-def checked_by_bodies(
-    verdict: Verdict, found: Posterior, declared: Declared, measurement: Measurement
-) -> CandidateExperiments:
-    """What of single bodies tells the answer that is given from the declared model, and from what it may be mistaken
-    for; nothing where no number does.
-    """
-    if verdict.kind == UNEXPLAINED:
-        return CandidateExperiments((), 0)
-    (answer,) = verdict.names or (BASE,)
-    odds_of = {**found.effects, BASE: max(found.nothing, sys.float_info.min)}
-    others = [label for label, p in odds_of.items() if label != answer and (p >= MISTAKEN or label == BASE)]
-    weights = {label: odds_of[label] for label in (answer, *sorted(others, key=lambda one: -odds_of[one]))}
-    bodies = wanted_bodies(measurement, declared, [acting_in(found, label) for label in weights])
-    checks = () if bodies is None else (check_by_bodies(found, weights, measurement.fit[0], bodies),)
-    return CandidateExperiments(checks, 0)
 
 
 def offered(condition: Condition, c: int, compared: Compared) -> Offered:

@@ -212,7 +212,7 @@ class Answers:
             measurement = joined(measurement, follow_up)
         fitted, held = self.model_pours(measurement.fit), self.model_pours(measurement.holdout)
         training = TrainingPours(declared, measurement.fit, fitted, self.budget, say)
-        compared = pursued(training, measurement, self.budget, say, follow_up is not None)
+        compared = pursued(training, measurement, self.budget, say, follow_up)
         verdict = verdict_of(compared, declared, training.pours, follow_up is not None)
         conclusion, verdict = concluded(verdict, compared, declared, measurement.holdout, held, say)
         found = compared.posterior

@@ -314,7 +314,7 @@ def test_an_effect_that_two_looks_leave_named_gets_no_third(steps, looks, monkey
     training = Rehearsed(steps)
     monkeypatch.setattr(diagnosis, "weighed", training.compared)
     monkeypatch.setattr(diagnosis, "inseparable", lambda compared, name: "")
-    diagnosis.pursued(training, SimpleNamespace(fit=(), bodies=()), Budget(), print, False)
+    diagnosis.pursued(training, SimpleNamespace(fit=(), bodies=()), Budget(), print, None)
     assert training.looks == looks
 
 
@@ -575,7 +575,7 @@ def test_without_held_out_conditions_nothing_is_confirmed_or_taken_back(measurem
     measure(monkeypatch, (), seed=1)
     declared = declare(measurement, NAMES[:1])
     training = TrainingPours(declared, measurement.fit, FormulaPours(measurement.fit, (), None, None), BUDGET, print)
-    compared = diagnosis.pursued(training, measurement, BUDGET, print, False)
+    compared = diagnosis.pursued(training, measurement, BUDGET, print, None)
     verdict = diagnosis.verdict_of(compared, declared, training.pours, False)
     conclusion, after = diagnosis.concluded(verdict, compared, declared, (), FormulaPours((), (), None, None), print)
     assert after == verdict

@@ -10,9 +10,8 @@ from scipy import stats
 
 from doe.declared.bodies import BodyEvidence, body_evidence, wanted_bodies
 from doe.declared.model import declare
-from doe.diagnose.candidate_experiments import _with_bodies
+from doe.diagnose.candidate_experiments import _with_bodies, checked_by_bodies
 from doe.diagnose.compared_features import MeasuredFeatures, weighed
-from doe.diagnose.diagnosis import checked_by_bodies
 from doe.diagnose.emulator import Lessons, Way
 from doe.diagnose.next_experiment import DRAWS, CandidateExperiment, Prediction, chance_of_an_answer
 from doe.diagnose.posterior import TEMPERATURE
@@ -125,14 +124,12 @@ def test_an_answer_that_is_given_is_checked_by_the_bodies_in_which_it_differs(da
     found, declared = known(compared(None).posterior), declare(data, tuple(EFFECTS))
     names = () if kind == "no_missing_effect" else (kind.partition(":")[2],)
     checks = checked_by_bodies(SimpleNamespace(kind=kind, names=names), found, declared, data)
-    (check,) = checks.suggestions
+    (check,) = checks
     assert (check.bodies, check.pours, check.values) == ((("bead", "mass"),), 0, {})
     assert check.rivals[0] == rivals[0]
     assert set(check.rivals) == set(rivals)
     rows = weighed_bodies(data, 1.0).rows
-    assert checked_by_bodies(
-        SimpleNamespace(kind=kind, names=names), found, declared, replace(data, bodies=rows)
-    ) == replace(checks, suggestions=())
+    assert checked_by_bodies(SimpleNamespace(kind=kind, names=names), found, declared, replace(data, bodies=rows)) == ()
 
 
 def test_no_body_checks_what_no_number_shows_nor_what_nothing_explains(data):
@@ -140,4 +137,4 @@ def test_no_body_checks_what_no_number_shows_nor_what_nothing_explains(data):
     alone = replace(found, effects={"rolling_resistance": 0.99, "density_error": 0.005})
     for kind, names in (("effect:rolling_resistance", ("rolling_resistance",)), ("unexplained", ())):
         checks = checked_by_bodies(SimpleNamespace(kind=kind, names=names), alone, declared, data)
-        assert checks.suggestions == ()
+        assert checks == ()
