@@ -9,12 +9,14 @@ import pytest
 from scipy import stats
 
 from doe.declared.bodies import BodyEvidence, body_evidence, wanted_bodies
+from doe.declared.budget import Budget
 from doe.declared.model import declare
+from doe.diagnose import diagnosis
 from doe.diagnose.candidate_experiments import _with_bodies, checked_by_bodies
 from doe.diagnose.compared_features import MeasuredFeatures, weighed
 from doe.diagnose.emulator import Lessons, Way
 from doe.diagnose.next_experiment import DRAWS, CandidateExperiment, Prediction, chance_of_an_answer
-from doe.diagnose.posterior import TEMPERATURE
+from doe.diagnose.posterior import TEMPERATURE, Posterior
 from doe.diagnose.result import BODIES_ALONE, Amplitude
 from doe.diagnose.verdict import THRESHOLD
 from doe.measurement import load_measurement
@@ -138,3 +140,43 @@ def test_no_body_checks_what_no_number_shows_nor_what_nothing_explains(data):
     for kind, names in (("effect:rolling_resistance", ("rolling_resistance",)), ("unexplained", ())):
         checks = checked_by_bodies(SimpleNamespace(kind=kind, names=names), alone, declared, data)
         assert checks == ()
+
+
+class Taught:
+    """Training pours that count the looks taken."""
+
+    ways, declared, looks = (), None, 0
+
+    def look(self, found):
+        self.looks += 1
+        return ("a",)
+
+    def lessons(self): ...
+    def instruments(self, data): ...
+    def refine(self, found, label): ...
+    def at_end(self, found):
+        return []
+
+
+@pytest.mark.parametrize(("poured", "looks"), [(False, 2), (True, 1)])
+def test_a_check_begins_with_what_taught_the_answer(data, monkeypatch, poured, looks):
+    """Piles need two looks until they name "a"; with bodies it is sure at once, and one look is taken at it."""
+    weighed_with = []
+
+    def made_up(lessons, ways, conditions, instruments, bodies):
+        weighed_with.append(bodies)
+        p = 0.99 if bodies else (0.5, 0.8, 0.97)[training.looks]
+        fit = SimpleNamespace(p=0.5)
+        found = Posterior(1.0 - p, 0.0, {"a": p}, {"base": fit, "a": fit}, (), 0.0)
+        return SimpleNamespace(posterior=found, refitted=lambda labels: bodies)
+
+    training = Taught()
+    monkeypatch.setattr(diagnosis, "weighed", made_up)
+    monkeypatch.setattr(diagnosis, "inseparable", lambda compared, name: "")
+    monkeypatch.setattr(diagnosis, "body_evidence", lambda part, declared: part.bodies or None)
+    rows = (MeasuredBody("bead", "mass", MASS, 0.01 * MASS),)
+    follow_up = replace(data, conditions=data.conditions if poured else (), bodies=rows)
+    both = replace(data, bodies=rows)
+    assert diagnosis.pursued(training, both, Budget(), print, follow_up) == rows
+    assert training.looks == looks
+    assert (weighed_with[0] is None) != poured
