@@ -224,7 +224,8 @@ def _run(
         else:
             joined_names = [condition.name for condition in found.conditions]
             write_next(following, order.folder, as_declared, found.suggestions[0], order.given, joined_names)
-            say(f"{following}: what to measure next, to be filled in; then --follow-up {following}")
+            what = "what to measure next" if found.suggestions[0].pours else "what of single bodies checks this answer"
+            say(f"{following}: {what}, to be filled in; then --follow-up {following}")
     if order.apply:
         write_whole(order.out / CORRECTED, corrected_toml(measurement, found))
         say(f"{order.out}/{CORRECTED}: the corrected model, for every command that takes a material")

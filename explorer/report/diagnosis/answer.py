@@ -356,7 +356,7 @@ def follow_up_text(result: DiagnosisResult) -> str:
     numbers = enumeration(list(dict.fromkeys(quantity.replace("_", " ") for _, quantity in first.bodies)))
     if not pours:
         others = enumeration([spelled(label) for label in first.rivals[1:]])
-        return f"To check it, measure {numbers} of single bodies, which tell it from {others}."
+        return f"To check it, measure {numbers} of single bodies, without a pour: that tells it from {others}."
     what = f"{pours} pours of {code(best.name)}"
     if first.bodies:
         what += f", with {numbers} of single bodies,"

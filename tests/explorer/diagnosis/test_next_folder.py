@@ -200,7 +200,7 @@ def test_single_bodies_are_asked_for_and_may_be_left_out(tmp_path, measured):
     folder = asking_for_bodies(tmp_path / "next", measured)
     text = (folder / "README.md").read_text()
     assert "- trefoil, mean mass of one body: count fifty, weigh them in five lots of ten" in text
-    assert "from body to body, over its mean: of the same thirty" in text
+    assert "from body to body, over its mean: measure thirty with a caliper" in text
     assert "3 pours and these numbers give the right answer" in text
     bodies, pours = folder / "bodies.csv", folder / "outlet_at_twice_the_height.csv"
     assert "# trefoil,mass,g,,\n# trefoil,length_spread,1,,\n" in bodies.read_text()

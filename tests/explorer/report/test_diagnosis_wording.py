@@ -118,7 +118,7 @@ def test_an_answer_that_is_given_says_what_would_check_it(results, case):
     result["next_experiment"] = [{"experiment": experiment, "rivals": rivals, **told}]
     text = diagnosis_markdown(result)
     other = "the declared model" if case == "effect" else "`density_error`"
-    assert f"To check it, measure mass of single bodies, which tell it from {other}." in text
+    assert f"To check it, measure mass of single bodies, without a pour: that tells it from {other}." in text
     assert "`explorer diagnose … --follow-up` takes them" in text
     assert "0 pours" not in text
 
