@@ -453,8 +453,8 @@ The data of {title} give this answer. No further pour is asked for: single bodie
 ## What it will decide
 
 These numbers give the right answer with a chance of **{percent(suggestion.experiment.chance)}**, if it is one of these.
-They also expose a cause that is in no library: it shifts piles much as some effect does, and leaves single bodies as they
-are declared.
+They also expose a cause that is in no library: it shifts piles much as some effect does, and leaves single bodies as
+they are declared.
 
 {_command(folder, source, given)}"""
 
