@@ -38,6 +38,8 @@ HOW = (
 OF_POURS, OF_BODIES = "pours", "single bodies"
 HOW_OF_BODIES = "The mean of each number, and the standard error of that mean, in the unit of its row."
 NOTHING_ASKED = "The answer that is shown under Diagnose asks for no follow-up."
+WRAPPED = {"wrapText": True, "autoHeight": True}
+"""Cells of long texts."""
 SAVED = "Saved: {} of {} values are filled in."
 ROWS = "the rows of the follow-up"
 
@@ -70,7 +72,7 @@ def _build(folder: Callable[[], Path | None], post: Post) -> None:
 
     if tables.bodies:
         table_heading(f"{TITLE}: {OF_BODIES}", HOW_OF_BODIES)
-        table_to_edit(body_columns(), body_rows(tables), bodies, post, height=f"{6 + 3 * len(tables.bodies)}rem")
+        table_to_edit(body_columns(), body_rows(tables), bodies, post, height=f"{6 + 7 * len(tables.bodies)}rem")
     if tables.numbers:
         table_heading(f"{TITLE}: {OF_POURS}", HOW)
         table_to_edit(number_columns(tables), number_rows(tables), pours, post)
@@ -118,8 +120,8 @@ def body_columns() -> list[Column]:
     """What is measured of which body, its unit, and two blue columns."""
     return [
         column("Body", "body", minWidth=100),
-        column("Quantity", "quantity", minWidth=200, flex=2),
-        column("How", "how", minWidth=200, flex=2),
+        column("Quantity", "quantity", minWidth=200, flex=2, **WRAPPED),
+        column("How", "how", minWidth=200, flex=2, **WRAPPED),
         column("Unit", "unit", minWidth=70),
         column("Mean", "mean", minWidth=100, **WRITTEN),
         column("Standard error", "standard_error", minWidth=100, **WRITTEN),
