@@ -99,8 +99,7 @@ def run_diagnosis(
     """Diagnose ``measurement`` against its declared model, with ``effects`` as candidates.
 
     Data sets of one model share their pours; those of another ``seed`` are others. The conditions of
-    a ``follow_up`` are fitted as well. ``plan_next``: whether what could be measured next is looked for, and poured
-    where the answer is ambiguous.
+    a ``follow_up`` are fitted as well. ``plan_next``: whether to look for what could be measured next.
     """
     declared, paths = declare(measurement, effects), [p.path for p in measurement.parameters]
     if follow_up is not None:
@@ -118,6 +117,7 @@ def run_diagnosis(
     confirmed, verdict = concluded(verdict, compared, declared, measurement.conditions, everywhere, say)
     candidates = CandidateExperiments((), 0)
     if follow_up is None and plan_next:
+        say("looking for what single bodies would tell, and what to measure next")
         candidates = suggested(verdict, compared.posterior, training, measurement, pours_in)
     return Diagnosis(
         declared=declared,
