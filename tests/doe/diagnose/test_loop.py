@@ -280,7 +280,7 @@ class Rehearsed:
     def __init__(self, steps):
         self._steps, self.looks, self.ways, self.declared = iter(steps), 0, (), None
 
-    def compared(self, *_):
+    def compared(self, *_, **__):
         name, p = next(self._steps)
         odds = {"a": 0.1 * (1.0 - p), "b": 0.1 * (1.0 - p)} | {name: p}
         fit = SimpleNamespace(p=0.01)
