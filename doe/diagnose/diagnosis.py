@@ -16,6 +16,7 @@ from doe.declared.pours import ROOT, ModelPours, OnPour
 from doe.diagnose.candidate_experiments import CandidateExperiments, acting_in, checked_by_bodies, next_experiment
 from doe.diagnose.compared_features import Compared, measured, weighed
 from doe.diagnose.confirm import CONTRADICTED, Confirmed, confirm, held_out, model_of, residual_maps
+from doe.diagnose.emulator import Lessons
 from doe.diagnose.posterior import Posterior, gain_by_pours, holds
 from doe.diagnose.result import BASE, NO_EFFECT, HeldOut, Level, Offered, Suggestion
 from doe.diagnose.training_pours import Say, TrainingPours
@@ -169,22 +170,22 @@ def pursued(
         parts.insert(0, replace(measurement, bodies=measurement.bodies[: -len(follow_up.bodies)]))
     for part in parts:
         bodies = body_evidence(part, training.declared)
-        weigh = partial(weighed, conditions=data, instruments=instruments, bodies=bodies)
+        weigh = partial(weighed, ways=training.ways, conditions=data, instruments=instruments, bodies=bodies)
         compared = _settled(training, weigh, budget, say, looked)
         label, sure = candidate(compared.posterior, follow_up is not None)
         if sure >= THRESHOLD:
             training.refine(compared.posterior, label)
-            compared = weigh(training.lessons(), training.ways)
+            compared = weigh(training.lessons())
             say(f"with pours on both sides of its best fit: {odds(compared.posterior)}")
             compared = compared.refitted(("base", compared.posterior.best[0]))
     return compared
 
 
 def _settled(
-    training: TrainingPours, weigh: Callable[..., Compared], budget: Budget, say: Say, looked: set[str]
+    training: TrainingPours, weigh: Callable[[Lessons], Compared], budget: Budget, say: Say, looked: set[str]
 ) -> Compared:
     """Models and data after closer looks, of which those at the effects ``looked`` have been taken."""
-    compared = weigh(training.lessons(), training.ways)
+    compared = weigh(training.lessons())
     say(f"after screening: {odds(compared.posterior)}")
     held, before = 0, ""
     for _ in range(budget.looks):
@@ -204,7 +205,7 @@ def _settled(
         if not poured:
             break
         looked |= set(poured)
-        compared = weigh(training.lessons(), training.ways)
+        compared = weigh(training.lessons())
         say(f"after a closer look at {', '.join(poured)}: {odds(compared.posterior)}")
     return compared
 
@@ -263,9 +264,7 @@ def odds(found: Posterior) -> str:
 def suggested(
     verdict: Verdict, found: Posterior, training: TrainingPours, measurement: Measurement, pours_in: PoursAt
 ) -> CandidateExperiments:
-    """What to measure next: the first of the fitted conditions changed, and bodies, where the answer is ambiguous;
-    bodies alone where one is given; nothing where it is unexplained.
-    """
+    """What to measure next: a changed set-up and bodies if it is ambiguous, bodies alone if an answer is given."""
     if not verdict.kind.startswith("ambiguous"):
         return CandidateExperiments(checked_by_bodies(verdict, found, training.declared, measurement), 0)
     weights = {label: found.effects[label] for label in verdict.names[:MOST_RIVALS]}

@@ -135,7 +135,7 @@ def _of_body(path: Path) -> Iterator[Path]:
 def _read(folder: Path, table: Settings, outside: Sequence[str], follow_up: bool) -> Measurement:
     file = checked(MeasurementFile, table)
     base = load_material(file.material, relative_to=folder)
-    given = _condition_entries(file.condition, bare=follow_up and file.bodies is not None)
+    given = _condition_entries(file.condition, needed=not follow_up or file.bodies is None)
     declared, bare = [], []
     for entry in given:
         with _within(entry.name):
@@ -194,15 +194,15 @@ def _of_one_material(bodies: Sequence[MeasuredBody], conditions: Sequence[Condit
             raise MeasurementError(f"bodies: {row.body}: differs between the fitted conditions; allowed: one material")
 
 
-def _condition_entries(tables: Sequence[Settings], bare: bool) -> list[ConditionTable]:
-    """The conditions in their order; ``bare``: there need be none."""
+def _condition_entries(tables: Sequence[Settings], needed: bool) -> list[ConditionTable]:
+    """The conditions in their order; ``needed``: whether there has to be one."""
     given: list[ConditionTable] = []
     for table in tables:
         with _within(table.get("name")):
             given.append(checked(ConditionTable, table))
         if given[-1].name in (entry.name for entry in given[:-1]):
             raise MeasurementError(f"condition.name: {given[-1].name!r} appears twice; allowed: each name once")
-    if not any(entry.role == "fit" for entry in given) and (given or not bare):
+    if not any(entry.role == "fit" for entry in given) and (given or needed):
         raise MeasurementError(
             f"condition.role: none of {len(given)} conditions has the role fit; at least one is needed"
         )

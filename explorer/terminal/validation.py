@@ -4,6 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
+from doe.diagnose.result import BODIES_ALONE
 from doe.validation.sets import RISKS, Answer, Rate, Scores, SetRow, Tempered, by_temperature, scores, targets
 from explorer.terminal.text_table import text_table
 from solver import PHYSICS
@@ -76,11 +77,15 @@ def followed_text(rows: Sequence[SetRow]) -> str:
     lines = [f"right names of library effects: {before} before the follow-up, {after} after it"]
     lines += [f"followed up: {sum(asked.values())} of {len(rows)} sets"] if asked else []
     lines += [f"  {number:4}  {change}" for change, number in asked.most_common()]
-    for pours in sorted({row.asked for row in rows if row.asked}):
-        own = [row for row in rows if row.asked == pours]
-        right = Rate(sum(row.answer == TRUE.get(row.kind, "right") for row in own), len(own))
-        chance = sum(row.chance for row in own) / len(own)
-        lines.append(f"answered by {pours} more pours, stated chance {chance:.0%}: {right}")
+    # Rows from before the number was kept have none either.
+    checks = {"checked by single bodies alone": [row for row in rows if row.follow_up == BODIES_ALONE]}
+    numbers = sorted({row.asked for row in rows if row.asked})
+    by_pours = {f"answered by {n} more pours": [row for row in rows if row.asked == n] for n in numbers}
+    for words, own in (checks | by_pours).items():
+        if own:
+            right = Rate(sum(row.answer == TRUE.get(row.kind, "right") for row in own), len(own))
+            chance = sum(row.chance for row in own) / len(own)
+            lines.append(f"{words}, stated chance {chance:.0%}: {right}")
     return "\n".join(lines)
 
 

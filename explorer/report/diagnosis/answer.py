@@ -83,7 +83,7 @@ def _what_next(result: DiagnosisResult) -> str:
                 f"missing beside it, {_asking_further(result)} asks.{_check(result)}"
             )
         case "ambiguous":
-            return f"{follow_up_text(result)} `explorer diagnose … --follow-up` takes them."
+            return _with_command(result)
         case "unexplained":
             further = ""
             if result.handed_on():
@@ -99,7 +99,12 @@ def _what_next(result: DiagnosisResult) -> str:
 
 def _check(result: DiagnosisResult) -> str:
     """What of single bodies would check an answer that is given; empty where nothing would."""
-    return f" {follow_up_text(result)} `explorer diagnose … --follow-up` takes them." if result.next_experiment else ""
+    return f" {_with_command(result)}" if result.next_experiment else ""
+
+
+def _with_command(result: DiagnosisResult) -> str:
+    """What to measure, and the command that takes it."""
+    return f"{follow_up_text(result)} `explorer diagnose … --follow-up` takes them."
 
 
 def _asking_further(result: DiagnosisResult) -> str:

@@ -65,19 +65,14 @@ def diagnosis_board(
 
 def _pressed(result: DiagnosisResult) -> Banner:
     """The verdict; what comes next by the buttons below it where there are any, and not by commands."""
-    further = ["What else is missing beside it?"] if result.handed_on() else []
+    shown = banner(result)
     if result.kind == "ambiguous" and result.next_experiment:
-        return replace(
-            banner(result), then="Pour and measure that, fill it in under Follow-up, above, and answer with it."
-        )
+        return replace(shown, then="Pour and measure that, fill it in under Follow-up, above, and answer with it.")
+    further = ["What else is missing beside it?"] if result.handed_on() else []
     check = [f"{follow_up_text(result)} Fill that in under Follow-up, above."] if result.next_experiment else []
     if result.added:
-        then = " ".join(["Pour the corrected model, and calibrate it.", *further, *check])
-    elif check:
-        then = f"Use the calibrated model. {check[0]}"
-    else:
-        return banner(result)
-    return replace(banner(result), then=then)
+        return replace(shown, then=" ".join(["Pour the corrected model, and calibrate it.", *further, *check]))
+    return replace(shown, then=f"Use the calibrated model. {check[0]}") if check else shown
 
 
 def _answers(result: DiagnosisResult) -> BoardTable:

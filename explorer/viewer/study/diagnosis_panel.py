@@ -450,8 +450,7 @@ def _follow_up_markdown(result: DiagnosisResult, folder: Path) -> str:
     return (
         f"{follow_up_text(result)}\n\n"
         f"Otherwise than in condition {code(asked.condition)}: {enumeration(changes) or 'nothing'}. "
-        "All else as before.\n\n"
-        f"{done}"
+        f"All else as before.\n\n{done}"
     )
 
 

@@ -9,6 +9,7 @@ import pytest
 from statsmodels.stats.proportion import proportion_confint
 
 from doe.diagnose.posterior import NOTHING, OUTSIDE, PAIRS
+from doe.diagnose.result import BODIES_ALONE
 from doe.diagnose.verdict import THRESHOLD
 from doe.errors import StatisticsError
 from doe.validation.sets import (
@@ -122,6 +123,11 @@ def test_follow_ups_are_held_against_the_chance_that_they_were_said_to_have():
     ]
     text = campaign_text([*rows, row(9, "null", "none", "no_missing_effect")])
     assert "answered by 6 more pours, stated chance 80%: 2/3 = 66.7 %" in text
+    assert "answered by 24 more pours, stated chance 80%: 1/2 = 50.0 %" in text
+    assert "single bodies" not in text
+    checks = [replace(one, follow_up=BODIES_ALONE, asked=0, chance=0.9) for one in rows[:2]]
+    text = campaign_text([*checks, *rows[3:]])
+    assert "checked by single bodies alone, stated chance 90%: 1/2 = 50.0 %" in text
     assert "answered by 24 more pours, stated chance 80%: 1/2 = 50.0 %" in text
 
 
