@@ -4,11 +4,19 @@ that few observations have told; means of few observations, shrunk.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
+from scipy import stats
 
 FloatArray = npt.NDArray[np.float64]
 Groups = npt.NDArray[np.int64]
+
+OUTLIER = 0.01
+"""Probability of an observation as far off as an outlier."""
+ROUNDS = 20
+"""In which the weights of outliers settle."""
 
 
 def shrunk_covariance(residuals: FloatArray) -> FloatArray:
@@ -54,6 +62,57 @@ def log_t(d: FloatArray, variance: FloatArray, loadings: FloatArray, freedom: in
     square = (d**2 / variance).sum(axis=1) - (seen * np.linalg.solve(inner, seen[..., None])[..., 0]).sum(axis=1)
     determinant = np.log(variance).sum(axis=1) + np.linalg.slogdet(inner)[1]
     return np.asarray(-0.5 * determinant - 0.5 * (freedom + 1) * np.log1p(square / freedom))
+
+
+def scatter_between(
+    blocks: Sequence[FloatArray],
+    features: Sequence[int],
+    freedom: int,
+    weights: Sequence[FloatArray] | None = None,
+) -> tuple[list[FloatArray], float]:
+    """Squared distances of whitened observations from their mean, and their variance over what is expected, 1 at least.
+
+    Parameters
+    ----------
+    blocks
+        Of some groups, on any axes, (n, D).
+    features
+        d, of each group.
+    freedom
+        ν, degrees of freedom of the covariance that whitened them: other observations look wider by ν/(ν − d − 1).
+    weights
+        Of the observations in their mean, (n,) each; by default the same.
+
+    Returns
+    -------
+    By group, (n,), each of distribution χ²_d, and the ratio over all of them.
+    """
+    weights = [np.ones(len(z)) for z in blocks] if weights is None else weights
+    squares, total, expected = [], 0.0, 0.0
+    for z, d, some in zip(blocks, features, weights, strict=True):
+        n = len(z)
+        slack = freedom / max(0.5 * freedom, freedom - d - 1.0)
+        # An observation is nearer to a mean that it is part of.
+        squares.append(((z - np.average(z, axis=0, weights=some)) ** 2).sum(axis=1) / slack * n / max(1, n - 1))
+        total += float(some @ squares[-1]) * (n - 1) / n
+        expected += (n - 1) * d
+    return squares, max(1.0, total / expected) if expected > 0.0 else 1.0
+
+
+def outlier_weights(
+    blocks: Sequence[FloatArray], features: Sequence[int], freedom: int
+) -> tuple[list[FloatArray], float]:
+    """Weights (n,) of whitened observations, in groups, in their mean, and what is left of their scatter.
+
+    min(1, χ²_d(1 − ``OUTLIER``) r/q): what is farther off than one in a hundred counts as if it were there (Huber 1981,
+    Robust Statistics, 8.4). Parameters as in :func:`scatter_between`.
+    """
+    weights, scatter = [np.ones(len(z)) for z in blocks], 1.0
+    for _ in range(ROUNDS):
+        squares, scatter = scatter_between(blocks, features, freedom, weights)
+        farthest = stats.chi2.isf(OUTLIER, features) * scatter
+        weights = [limit / np.maximum(limit, one) for one, limit in zip(squares, farthest, strict=True)]
+    return weights, scatter
 
 
 def _within(values: FloatArray, group: Groups) -> FloatArray:

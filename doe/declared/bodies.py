@@ -40,6 +40,8 @@ NEGLIGIBLE = 0.1
 TOGETHER = 0.2
 """How well two effects that both move an apparent friction are known together, relative: of fifteen pairs that were
 tested on the trefoil none is further off the sum of loads, but simplified JKR adhesion by 0.2 beside another."""
+LIKELY = 2.0
+"""Standard deviations of an amplitude about its best fit within which it may be."""
 FINE = 9
 """Amplitudes within the cell of one that is weighed: a balance may tell more than one from the next."""
 
@@ -107,9 +109,16 @@ class BodyEvidence:
         return _white(self.factor, mean), _white(self.factor, _white(self.factor, covariance).T)
 
     def told_apart(self, answers: Sequence[Acting]) -> npt.NDArray[np.bool_]:
-        """Numbers (q,) in which two of ``answers`` differ by more than a standard deviation, parameters' in it."""
+        """Numbers (q,) in which ``answers`` may differ by more than a standard deviation, parameters' in it.
+
+        They may act as much as ``LIKELY`` says: an effect that piles hardly show fits best at next to nothing.
+        """
         self.set_up(name for acting in answers for name, _, _ in acting)
-        shifts = [[self.shift(name, np.array(amplitude)) for name, amplitude, _ in acting] for acting in answers]
+        shifts = [
+            [self.shift(name, np.array(amplitude + off * deviation)) for name, amplitude, deviation in acting]
+            for acting in answers
+            for off in (-LIKELY, 0.0, LIKELY)
+        ]
         means = [self._together(some, (len(self.rows),)) for some in shifts]
         return np.asarray(np.ptp(means, axis=0) > np.linalg.norm(self.factor, axis=1))
 

@@ -2,17 +2,20 @@
 
 A feature is compared where the data offer it in at least two replicates and half of them (in the one that there is),
 where ``READABLE`` of the base model's pours give it, and where it varies at all in the pours. What the data offer is a
-matter of names (``doe/measurement/features.py``), so nothing here looks at a value and chooses.
+matter of names (``doe/measurement/features.py``), so nothing here looks at a value and chooses. Whether a model fits is
+asked of the replicates without outliers (``outlier_weights``); all of them weigh one model against another.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from doe.analysis.covariance import outlier_weights, scatter_between
 from doe.declared.bodies import BodyEvidence
 from doe.diagnose.emulator import Emulator, Lessons, Way, emulated
 from doe.diagnose.posterior import Data, Posterior, fitted, posterior
@@ -155,16 +158,29 @@ def weighed(
     numbers = np.array([len(b) * one.mean_of for b, one in zip(blocks, conditions, strict=True)], dtype=np.float64)
     weights = numbers / numbers.mean()
     emulator, plain = (emulated(taught, ways, weights.tolist(), shrunk) for shrunk in (True, False))
+    white = [
+        emulator.whitened(c, block) * math.sqrt(one.mean_of / weight)
+        for c, (block, one, weight) in enumerate(zip(blocks, conditions, weights, strict=True))
+    ]
+    pours = white, [block.shape[1] for block in blocks], emulator.freedom
     data = Data(
         emulator.seen(blocks),
         float(numbers.mean()),
-        _scatter(emulator, blocks, weights, conditions),
+        scatter_between(*pours)[1],
         _loadings(emulator, blocks, conditions, columns, instruments),
         bodies,
     )
+    found = posterior(emulator, data)
+    shares, scatter = outlier_weights(*pours)
+    if any(one.min() < 1.0 for one in shares):
+        # A pile that came down in a lump may tell one effect from another, but a model is of what piles are on average.
+        number = data.replicates * float(np.mean([one.mean() for one in shares]))
+        typical = replace(data, z=emulator.seen(blocks, shares), replicates=number, scatter=scatter)
+        fits = {label: replace(fit, p=fitted(emulator, typical, label).p) for label, fit in found.fits.items()}
+        found = replace(found, fits=fits)
     names = tuple(tuple(one.names[k] for k in chosen) for one, chosen in zip(conditions, columns, strict=True))
     labels = tuple(one.condition for one in conditions)
-    return Compared(labels, names, tuple(left_out), blocks, data, emulator, posterior(emulator, data), plain)
+    return Compared(labels, names, tuple(left_out), blocks, data, emulator, found, plain)
 
 
 def usable(lessons: Lessons, offered: Sequence[npt.NDArray[np.int64]]) -> tuple[Lessons, list[npt.NDArray[np.int64]]]:
@@ -204,28 +220,6 @@ def _varies(lessons: Lessons, c: int) -> npt.NDArray[np.bool_]:
         some = block[groups == group]
         varies |= np.ptp(some, axis=0) > CONSTANT * size
     return varies
-
-
-def _scatter(
-    emulator: Emulator, blocks: Sequence[FloatArray], weights: FloatArray, conditions: Sequence[MeasuredFeatures]
-) -> float:
-    """r: variance of the replicates over that of pours, 1 at least, and at most known to be more than the noise of Σ.
-
-    Whitening by a Σ of ν degrees of freedom makes other pours look wider, by about ν/(ν − d − 1) in d features.
-    """
-    square = expected = 0.0
-    first = 0
-    for squash, block, weight, one in zip(emulator.squashes, blocks, weights, conditions, strict=True):
-        d = block.shape[1]
-        last = first + d
-        if len(block) > 1 and one.mean_of == 1:
-            drawn_in = squash(block)
-            left = (drawn_in - drawn_in.mean(axis=0)) @ emulator.whitening[:, first:last].T
-            square += float((left**2).sum()) / weight
-            slack = emulator.freedom / max(0.5 * emulator.freedom, emulator.freedom - d - 1.0)
-            expected += (len(block) - 1) * d * slack
-        first = last
-    return max(1.0, square / expected) if expected > 0.0 else 1.0
 
 
 def _loadings(

@@ -189,10 +189,18 @@ class Emulator:
     reached: tuple[float, ...]
     excess: FloatArray
 
-    def seen(self, pours: Sequence[FloatArray]) -> FloatArray:
-        """Mean of ``pours``, z (D,)."""
-        means = [squash(block).mean(axis=0) for squash, block in zip(self.squashes, pours, strict=True)]
+    def seen(self, pours: Sequence[FloatArray], weights: Sequence[FloatArray] | None = None) -> FloatArray:
+        """Mean of ``pours``, z (D,), of the same weight or of ``weights`` in each condition."""
+        weights = [np.ones(len(block)) for block in pours] if weights is None else weights
+        of_all = zip(self.squashes, pours, weights, strict=True)
+        means = [np.average(squash(block), axis=0, weights=some) for squash, block, some in of_all]
         return np.asarray(self.whitening @ np.concatenate(means), dtype=np.float64)
+
+    def whitened(self, condition: int, pours: FloatArray) -> FloatArray:
+        """What ``pours`` (n, d_c) in a condition contribute to z, (n, D)."""
+        sizes = [len(squash.centre) for squash in self.squashes]
+        first = sum(sizes[:condition])
+        return np.asarray(self.squashes[condition](pours) @ self.whitening[:, first : first + sizes[condition]].T)
 
     def features(self, z: FloatArray) -> FloatArray:
         """Features (..., D) of all conditions, natural units, that ``z`` (..., D) stands for."""

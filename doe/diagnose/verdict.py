@@ -241,9 +241,6 @@ def _parameter_row(parameter: CalibratedParameter, j: int, before: Fit, after: F
 
 def _residuals(compared: Compared, before: Fit, after: Fit) -> tuple[Residual, ...]:
     emulator, data = compared.emulator, compared.data
-    squashed = np.concatenate(
-        [squash(block).mean(axis=0) for squash, block in zip(emulator.squashes, compared.blocks, strict=True)]
-    )
     inverse = np.linalg.inv(emulator.whitening)
     measured = emulator.features(data.z)
     columns = []
@@ -251,7 +248,7 @@ def _residuals(compared: Compared, before: Fit, after: Fit) -> tuple[Residual, .
         noise = np.diag(fit.variance) + data.instrument @ data.instrument.T
         spread = noise + fit.slopes @ fit.theta_covariance @ fit.slopes.T
         sigma = np.sqrt(np.einsum("ij,jk,ik->i", inverse, spread, inverse, optimize=True))
-        columns.append((emulator.features(fit.z), (squashed - inverse @ fit.z) / sigma))
+        columns.append((emulator.features(fit.z), inverse @ (data.z - fit.z) / sigma))
     conditions = zip(compared.conditions, compared.names, strict=True)
     labels = [(condition, name) for condition, names in conditions for name in names]
     (one, z_one), (other, z_other) = columns

@@ -141,6 +141,12 @@ def test_what_tells_two_answers_apart_is_asked_for(data, answers, wanted):
     assert ([] if found is None else [row.quantity for row in found.rows]) == wanted
 
 
+def test_what_an_effect_that_fits_weakly_may_do_is_asked_for(data):
+    known, loose = ([("density_error", 0.005, deviation)] for deviation in (0.001, 0.01))
+    assert wanted_bodies(data, declare(data, NAMES), [known, []]) is None
+    assert [row.quantity for row in wanted_bodies(data, declare(data, NAMES), [loose, []]).rows] == ["mass"]
+
+
 def test_what_is_measured_is_not_asked_for_again(data):
     data = replace(data, bodies=(MeasuredBody("bead", "mass", MASS, 0.01 * MASS),))
     assert wanted_bodies(data, declare(data, NAMES), [acting("density_error"), []]) is None

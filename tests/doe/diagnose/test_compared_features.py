@@ -76,6 +76,29 @@ def test_the_scatter_of_the_data_is_told_on_average():
     assert np.mean(found) == pytest.approx(far / near, rel=0.1)
 
 
+def test_a_pile_that_came_down_in_a_lump_is_no_evidence_against_a_model():
+    """Under the declared model, of which one pile of twelve is five deviations off in 15 of 45 features."""
+    rng, names = np.random.default_rng(0), tuple(f"height {k}" for k in range(45))
+    way = np.repeat([-1, 0], 60)
+    blocks = tuple(rng.standard_normal((120, 45)) + 0.5 * (way == 0)[:, None] for _ in range(2))
+    taught = Lessons(np.zeros((120, 0)), way, (way == 0).astype(float), np.ones(120, bool), blocks)
+    piles = rng.standard_normal((2, 6, 45))
+    lump, wrong = piles.copy(), piles.copy()
+    lump[0, 3, ::3] += SQUASH * np.sinh(5.0 / SQUASH)
+    wrong[0, :, ::3] += 1.0
+
+    def p_of(piles):
+        conditions = [
+            MeasuredFeatures(name, "scan", names, block, np.zeros(45), scalars=1)
+            for name, block in zip(("low", "high"), piles, strict=True)
+        ]
+        return weighed(taught, WAYS, conditions).posterior.fits["base"].p
+
+    assert p_of(piles) > 0.1
+    assert p_of(lump) > 0.1
+    assert p_of(wrong) < 0.01
+
+
 def test_more_pours_in_a_condition_count_for_more():
     """The noise of the mean of every condition comes out as one, whatever its pours."""
     rng = np.random.default_rng(2)
