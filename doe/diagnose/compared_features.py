@@ -135,8 +135,8 @@ def weighed(
     instruments: Sequence[Instrument] = (),
     bodies: BodyEvidence | None = None,
 ) -> Compared:
-    """Weigh all models by the data of the fitted ``conditions``, freed from the bias of their ``instruments``, and by
-    what was measured of single bodies.
+    """Weigh all models by the data of fitted ``conditions``, the first that were poured, freed from the bias of their
+    ``instruments``, and by what was measured of single bodies.
 
     Raises StatisticsError where a condition has nothing that can be compared.
     """
@@ -145,6 +145,7 @@ def weighed(
             replace(one, values=one.values - instrument.bias[: one.values.shape[1]])
             for one, instrument in zip(conditions, instruments, strict=True)
         ]
+    lessons = replace(lessons, blocks=lessons.blocks[: len(conditions)])
     taught, columns = usable(lessons, [_there(condition) for condition in conditions])
     left_out = [
         f"{condition.condition}: {condition.names[k]}"

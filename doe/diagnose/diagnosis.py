@@ -164,13 +164,14 @@ def pursued(
     """Models and data once what is in question has been looked at more closely; ``follow_up``: what is in the data."""
     data = [measured(condition) for condition in measurement.fit]
     instruments, looked = training.instruments(data), set[str]()
-    parts = [measurement]
-    if follow_up is not None and not follow_up.conditions:
-        # What bodies settle needs no look, and yet what taught the answer that they check has to teach the check.
-        parts.insert(0, replace(measurement, bodies=measurement.bodies[: -len(follow_up.bodies)]))
-    for part in parts:
-        bodies = body_evidence(part, training.declared)
-        weigh = partial(weighed, ways=training.ways, conditions=data, instruments=instruments, bodies=bodies)
+    parts = [(len(data), measurement)]
+    if follow_up is not None:
+        # What a follow-up settles needs no look, and yet what taught the answers before it has to teach it.
+        known = replace(measurement, bodies=measurement.bodies[: len(measurement.bodies) - len(follow_up.bodies)])
+        parts.insert(0, (len(data) - len(follow_up.fit), known))
+    for number, part in parts:
+        by_bodies = partial(weighed, ways=training.ways, bodies=body_evidence(part, training.declared))
+        weigh = partial(by_bodies, conditions=data[:number], instruments=instruments[:number])
         compared = _settled(training, weigh, budget, say, looked)
         label, sure = candidate(compared.posterior, follow_up is not None)
         if sure >= THRESHOLD:

@@ -123,8 +123,7 @@ class Fit:
     log_evidence
         ln Z.
     p
-        Probability of data at least as far off as these, or as those without outliers where there are any, were the
-        model at its best amplitude true.
+        Probability of data at least as far off as these, without outliers, were the model at its best amplitude true.
     """
 
     label: str

@@ -152,19 +152,21 @@ class Taught:
         return ("a",)
 
     def lessons(self): ...
-    def instruments(self, data): ...
+    def instruments(self, data):
+        return []
+
     def refine(self, found, label): ...
     def at_end(self, found):
         return []
 
 
-@pytest.mark.parametrize(("poured", "looks"), [(False, 2), (True, 1)])
-def test_a_check_begins_with_what_taught_the_answer(data, monkeypatch, poured, looks):
-    """Piles need two looks until they name "a"; with bodies it is sure at once, and one look is taken at it."""
+@pytest.mark.parametrize("poured", [False, True])
+def test_a_follow_up_begins_with_what_taught_the_answers_before_it(data, monkeypatch, poured):
+    """Piles need two looks until they name "a"; with the follow-up it is sure at once, and one look is taken at it."""
     weighed_with = []
 
     def made_up(lessons, ways, conditions, instruments, bodies):
-        weighed_with.append(bodies)
+        weighed_with.append((len(conditions), bodies))
         p = 0.99 if bodies else (0.5, 0.8, 0.97)[training.looks]
         fit = SimpleNamespace(p=0.5)
         found = Posterior(1.0 - p, 0.0, {"a": p}, {"base": fit, "a": fit}, (), 0.0)
@@ -175,8 +177,9 @@ def test_a_check_begins_with_what_taught_the_answer(data, monkeypatch, poured, l
     monkeypatch.setattr(diagnosis, "inseparable", lambda compared, name: "")
     monkeypatch.setattr(diagnosis, "body_evidence", lambda part, declared: part.bodies or None)
     rows = (MeasuredBody("bead", "mass", MASS, 0.01 * MASS),)
-    follow_up = replace(data, conditions=data.conditions if poured else (), bodies=rows)
-    both = replace(data, bodies=rows)
+    follow_up = replace(data, conditions=data.fit if poured else (), bodies=rows)
+    both = replace(data, conditions=(*data.fit, *follow_up.fit), bodies=rows)
     assert diagnosis.pursued(training, both, Budget(), print, follow_up) == rows
-    assert training.looks == looks
-    assert (weighed_with[0] is None) != poured
+    assert training.looks == 2
+    assert weighed_with[0] == (len(data.fit), None)
+    assert weighed_with[-1] == (len(both.fit), rows)
