@@ -104,14 +104,15 @@ def outlier_weights(
 ) -> tuple[list[FloatArray], float]:
     """Weights (n,) of whitened observations, in groups, in their mean, and what is left of their scatter.
 
-    min(1, χ²_d(1 − ``OUTLIER``) r/q): what is farther off than one in a hundred counts as if it were there (Huber 1981,
-    Robust Statistics, 8.4). Parameters as in :func:`scatter_between`.
+    min(1, χ²_d(1 − ``OUTLIER``) r/q), as Huber weighs scatter (1981, Robust Statistics, ch. 8): what is farther off
+    than one in a hundred is of as much more variance as puts it there, and weighs by the inverse of that. Parameters as
+    in :func:`scatter_between`.
     """
     weights, scatter = [np.ones(len(z)) for z in blocks], 1.0
+    farthest = stats.chi2.isf(OUTLIER, features)
     for _ in range(ROUNDS):
         squares, scatter = scatter_between(blocks, features, freedom, weights)
-        farthest = stats.chi2.isf(OUTLIER, features) * scatter
-        weights = [limit / np.maximum(limit, one) for one, limit in zip(squares, farthest, strict=True)]
+        weights = [limit / np.maximum(limit, one) for one, limit in zip(squares, farthest * scatter, strict=True)]
     return weights, scatter
 
 
