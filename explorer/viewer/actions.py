@@ -7,6 +7,7 @@ is no click. Work that takes seconds (reading scans, fitting spheres) is done of
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
 import time
@@ -24,6 +25,8 @@ Post = Callable[[Action], None]
 ClientAction = Callable[[Any], None]
 """Something that is done to one browser."""
 Found = TypeVar("Found")
+HANDS_OFF = 1.5
+"""Seconds after a person's input during which the program's own value does not move the widget."""
 
 
 class Actions:
@@ -67,6 +70,39 @@ class FrameClock:
         """Wait until the next frame is due, or ``stop`` is set; not at all where it is due already."""
         self._due = max(self._due + self._interval, time.monotonic())
         stop.wait(self._due - time.monotonic())
+
+
+class SharedBox:
+    """A widget that a person and the program (the solver's values, another panel) both move.
+
+    viser writes what a browser sends into the handle at once and calls back on another thread, many milliseconds later
+    on a busy machine. Whoever follows the program meanwhile would put the old value back, and the call would read that:
+    so a value that the program did not write counts as a person's hand from the moment it is seen.
+    """
+
+    def __init__(self, handle: Any) -> None:
+        self.handle, self._known, self._touched = handle, handle.value, -math.inf
+
+    @property
+    def value(self) -> Any:
+        """What the widget shows."""
+        return self.handle.value
+
+    def held(self) -> bool:
+        """Whether a person is at it, or was ``HANDS_OFF`` ago."""
+        # `in` and not `==`: a browser may send NaN, which is the same thing and yet not equal.
+        if self.handle.value not in (self._known,):
+            self.touch()
+        return time.monotonic() < self._touched + HANDS_OFF
+
+    def touch(self) -> None:
+        """Note that a person entered what it shows."""
+        self._touched, self._known = time.monotonic(), self.handle.value
+
+    def show(self, value: Any) -> None:
+        """Move it to what the program has."""
+        self.handle.value = value
+        self._known = self.handle.value
 
 
 def button_group(gui: viser.GuiApi, title: str, acts: Mapping[str, Action], post: Post, hint: str | None = None) -> Any:

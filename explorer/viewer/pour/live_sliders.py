@@ -7,7 +7,6 @@ logarithmic scale, and as a factor where it stands for several values that diffe
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +14,7 @@ from typing import Any
 import viser
 
 from explorer.units import checked, screen_unit, title
-from explorer.viewer.actions import Post
+from explorer.viewer.actions import Post, SharedBox
 from explorer.viewer.number_box import with_decimals
 from solver.params import Parameter
 from solver.scenes.scene import Scene, value
@@ -31,8 +30,6 @@ LARGEST_FACTOR, LARGEST_POWER = 4.0, 100.0
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 DECADES = 1.0
 """A logarithmic slider reaches this far to either side of the present value, then out to whole decades."""
-HANDS_OFF = 1.5
-"""Seconds after a person's input during which the solver's echo does not move the control."""
 
 
 class LiveControl:
@@ -49,7 +46,6 @@ class LiveControl:
         label: str = "",
     ) -> None:
         self._parameter, self._paths, self._label = parameter, tuple(paths), label
-        self._touched = -math.inf
         self._faces = self._made(gui, scene)
         for face in self._faces:
             self._listen(face, post, apply)
@@ -65,17 +61,17 @@ class LiveControl:
         number = self._number(scene)
         for face in self._faces:
             shown = face.shown(number)
-            if not math.isclose(face.handle.value, shown, rel_tol=1e-9, abs_tol=1e-9):
-                face.handle.value = shown
+            if not math.isclose(face.box.value, shown, rel_tol=1e-9, abs_tol=1e-9):
+                face.box.show(shown)
 
     def remove(self) -> None:
         """Take the control off the page."""
         for face in self._faces:
-            face.handle.remove()
+            face.box.handle.remove()
 
     @property
     def _held(self) -> bool:
-        return time.monotonic() < self._touched + HANDS_OFF
+        return any(face.box.held() for face in self._faces)
 
     def _made(self, gui: viser.GuiApi, scene: Scene) -> tuple[Face, ...]:
         faces = log_faces if self._parameter.scale == "log" else linear_faces
@@ -88,11 +84,11 @@ class LiveControl:
         def entered(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is None:  # set by follow(), not by a person
                 return
-            self._touched = time.monotonic()
             number = event.target.value
+            face.box.touch()
             post(lambda: apply(self._values(face.read(number))))
 
-        face.handle.on_update(entered)
+        face.box.handle.on_update(entered)
 
     def _values(self, number: float) -> Mapping[str, float | str]:
         return dict.fromkeys(self._paths, screen_unit(self._parameter).to_si(number))
@@ -121,9 +117,9 @@ class ScalingControl(LiveControl):
             bottom, top = (round(math.log10(end), POWER_DIGITS) for end in (max(low, 1.0 / LARGEST_POWER), high))
             hint = f"1 is ten times as much, −1 a tenth. {hint}"
             slider = gui.add_slider(f"{name}, decades", bottom, top, LINEAR_STEP, 0.0, hint=hint)
-            return (Face(slider, math.log10, lambda entered: 10.0 ** checked(entered, bottom, top, name)),)
+            return (Face(SharedBox(slider), math.log10, lambda entered: 10.0 ** checked(entered, bottom, top, name)),)
         slider = gui.add_slider(f"{name} ×", low, high, LINEAR_STEP, 1.0, hint=hint)
-        return (Face(slider, lambda factor: factor, lambda entered: checked(entered, low, high, name)),)
+        return (Face(SharedBox(slider), lambda factor: factor, lambda entered: checked(entered, low, high, name)),)
 
     def _number(self, scene: Scene) -> float:
         return self._factor  # it fits, or the control is made anew
@@ -146,7 +142,7 @@ def control_for(scene: Scene, paths: Sequence[str]) -> type[LiveControl]:
 class Face:
     """One widget of a control. Numbers are in the unit of the screen."""
 
-    handle: Any
+    box: SharedBox
     shown: Callable[[float], float]
     """Number → value of the widget."""
     read: Callable[[object], float]
@@ -157,7 +153,7 @@ def linear_faces(gui: viser.GuiApi, parameter: Parameter, start: float, label: s
     """A slider over the declared range, called ``label`` or as the parameter is."""
     name, (low, high) = titled(parameter, label), screen_range(parameter)
     slider = gui.add_slider(name, low, high, LINEAR_STEP, start, hint=parameter.doc)
-    return (Face(slider, lambda number: number, lambda entered: checked(entered, low, high, name)),)
+    return (Face(SharedBox(slider), lambda number: number, lambda entered: checked(entered, low, high, name)),)
 
 
 def log_faces(gui: viser.GuiApi, parameter: Parameter, start: float, label: str = "") -> tuple[Face, ...]:
@@ -185,8 +181,8 @@ def log_faces(gui: viser.GuiApi, parameter: Parameter, start: float, label: str 
     def number_from(power: object) -> float:
         return min(max(10.0 ** checked(power, bottom, top, name), low), high)
 
-    read = Face(box, lambda number: number, lambda entered: checked(entered, low, high, name))
-    return read, Face(slider, power_of, number_from)
+    read = Face(SharedBox(box), lambda number: number, lambda entered: checked(entered, low, high, name))
+    return read, Face(SharedBox(slider), power_of, number_from)
 
 
 def titled(parameter: Parameter, label: str) -> str:

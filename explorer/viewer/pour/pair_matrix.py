@@ -6,8 +6,6 @@ several.
 
 from __future__ import annotations
 
-import math
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from html import escape
@@ -16,8 +14,8 @@ from typing import Any
 import viser
 
 from explorer.units import InputError, checked, quantity, screen_unit, title
-from explorer.viewer.actions import Post
-from explorer.viewer.pour.live_sliders import HANDS_OFF, LINEAR_STEP, Apply, screen_range
+from explorer.viewer.actions import Post, SharedBox
+from explorer.viewer.pour.live_sliders import LINEAR_STEP, Apply, screen_range
 from explorer.viewer.view import small_html
 from solver.params import Parameter, declared
 from solver.scenes.material import Pair
@@ -46,21 +44,21 @@ class PairMatrix:
             self._table.content = html
         for row in self._rows:
             numbers = self._numbers(scene, row.paths)
-            if time.monotonic() < row.touched + HANDS_OFF or entries(row.handle.value) == numbers:
+            if row.box.held() or entries(row.box.value) == numbers:
                 continue
-            row.shown, row.handle.value = numbers, numbers if len(numbers) > 1 else numbers[0]
+            row.shown = numbers
+            row.box.show(numbers if len(numbers) > 1 else numbers[0])
 
     def _row(self, gui: viser.GuiApi, scene: Scene, one: str, others: tuple[str, ...]) -> PairRow:
         paths = tuple(f"pair.{one}.{other}.{self._name}" for other in others)
         numbers, (low, high) = self._numbers(scene, paths), screen_range(self._parameter)
         hint = f"{one} with {', '.join(others)}. {self._parameter.doc}"
         if len(numbers) == 1:
-            return PairRow(
-                gui.add_number(one, numbers[0], min=low, max=high, step=LINEAR_STEP, hint=hint), paths, numbers
-            )
+            number = gui.add_number(one, numbers[0], min=low, max=high, step=LINEAR_STEP, hint=hint)
+            return PairRow(SharedBox(number), paths, numbers)
         add: Any = gui.add_vector2 if len(numbers) == 2 else gui.add_vector3
         ends = {"min": (low,) * len(numbers), "max": (high,) * len(numbers)}
-        return PairRow(add(one, numbers, **ends, step=LINEAR_STEP, hint=hint), paths, numbers)
+        return PairRow(SharedBox(add(one, numbers, **ends, step=LINEAR_STEP, hint=hint)), paths, numbers)
 
     def _numbers(self, scene: Scene, paths: tuple[str, ...]) -> tuple[float, ...]:
         return tuple(screen_unit(self._parameter).to_screen(float(value(scene, path))) for path in paths)
@@ -69,11 +67,11 @@ class PairMatrix:
         def entered(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is None:  # set by follow(), not by a person
                 return
-            row.touched = time.monotonic()
             sent = event.target.value
+            row.box.touch()
             post(lambda: self._take(row, sent))
 
-        row.handle.on_update(entered)
+        row.box.handle.on_update(entered)
 
     def _take(self, row: PairRow, sent: object) -> None:
         """Set those pairs of a row whose box shows another number than before."""
@@ -93,12 +91,10 @@ class PairMatrix:
 class PairRow:
     """Boxes for the pairs of one material with some others."""
 
-    handle: Any
+    box: SharedBox
     paths: tuple[str, ...]
     shown: tuple[float, ...]
     """What the boxes showed last, in the unit of the screen."""
-    touched: float = -math.inf
-    """Moment of a person's last input [s]."""
 
 
 def pair_parameters() -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from explorer.background.command_process import CommandStatus, PourPlace
 from explorer.background.events import FailedRun, failures
 from explorer.background.orders import BackgroundOrders
 from explorer.outcomes import outcome_text
-from explorer.viewer.actions import Action, Post, button_group
+from explorer.viewer.actions import Action, Post, SharedBox, button_group
 
 MARKDOWN_MARKS = re.compile(r"([\\`*_{}\[\]<>()#+!|~&])")
 
@@ -79,22 +79,24 @@ class PlaceChoice:
     """A list of where the next command of ``what`` pours; none where there is nothing to choose."""
 
     def __init__(self, server: viser.ViserServer, place: PourPlace, what: str, post: Post) -> None:
-        self._place, self._list = place, None
+        self._place, self._box = place, None
         if len(place.offered) == 1:
             return
         hint = f"Where the next {what} pours, also one that is resumed: on the workers of a Dask scheduler, or here."
-        self._list = server.gui.add_dropdown("Pour on", place.offered, initial_value=place.chosen, hint=hint)
+        offered = server.gui.add_dropdown("Pour on", place.offered, initial_value=place.chosen, hint=hint)
+        self._box = box = SharedBox(offered)
 
-        @self._list.on_update
+        @offered.on_update
         def _(event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
             if event.client_id is not None:  # not what the panel itself sets
                 sent = str(event.target.value)
+                box.touch()
                 post(lambda: place.choose(sent))
 
     def show(self) -> None:
         """What was chosen, perhaps in another panel."""
-        if self._list is not None and self._list.value != self._place.chosen:
-            self._list.value = self._place.chosen  # type: ignore[misc]
+        if self._box is not None and not self._box.held() and self._box.value != self._place.chosen:
+            self._box.show(self._place.chosen)
 
 
 def progress(status: CommandStatus) -> float:

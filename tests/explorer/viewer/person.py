@@ -79,11 +79,16 @@ class Person:
         """Send a file by the button with these words. The line of a refusal."""
         return self.send(label, viser.UploadedFile(name, content))
 
-    def send(self, label, value):
-        """Send ``value`` to a control whatever it is, as nobody at the page could. The line of a refusal."""
+    def send(self, label, value, before_call=lambda: None):
+        """Send ``value`` to a control whatever it is, as nobody at the page could. The line of a refusal.
+
+        before_call: what another thread does after viser has taken the value over and before it calls back.
+        """
         handle = self.control(label)
         if not isinstance(handle, viser.GuiButtonHandle | viser.GuiUploadButtonHandle) and _fits(handle, value):
             handle.value = value
+            before_call()
+            value = handle.value
         told = SimpleNamespace(value=value)
         for callback in tuple(handle._impl.update_cb):
             callback(SimpleNamespace(client_id=0, client=self.browser, target=told))

@@ -166,7 +166,7 @@ def sections(server):
 @pytest.fixture
 def let_go(monkeypatch):
     """A call lets the time pass after which a control that a person moved follows the solver again."""
-    return lambda: monkeypatch.setattr("explorer.viewer.pour.live_sliders.HANDS_OFF", 0.0)
+    return lambda: monkeypatch.setattr("explorer.viewer.actions.HANDS_OFF", 0.0)
 
 
 def friction(session):
@@ -251,6 +251,25 @@ def test_moving_the_box_and_the_logarithmic_slider_sends_pascals(server):
     person.enter(POWER, 2.0)
     person.send(POWER, 99.0)
     assert [values[path] for values in sent] == pytest.approx([80e6, 100e6, 1e9])
+
+
+def test_the_solver_does_not_take_back_what_a_person_sent_before_the_call_of_it_comes(server, let_go):
+    made, person, sent, path = control(server, "static_friction", "pair.seed.seed")
+    person.send("Static friction", 0.25, before_call=lambda: made.follow(SCENE))
+    assert sent == [{path: 0.25}]
+    let_go()  # refused or overtaken, it goes back with the next frame
+    made.follow(SCENE)
+    assert person.value("Static friction") == value(SCENE, path)
+
+
+def test_a_control_goes_back_where_the_browser_left_before_the_call_of_what_it_sent(server, let_go):
+    made, person, _, path = control(server, "static_friction", "pair.seed.seed")
+    person.control("Static friction").value = 0.25
+    made.follow(SCENE)
+    assert person.value("Static friction") == 0.25
+    let_go()
+    made.follow(SCENE)
+    assert person.value("Static friction") == value(SCENE, path)
 
 
 def test_a_power_of_ten_is_shown_with_the_digits_that_its_box_holds(server):

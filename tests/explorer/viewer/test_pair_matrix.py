@@ -84,9 +84,26 @@ def test_the_boxes_follow_the_solver_unless_a_person_is_at_the_row(server, monke
     made.follow(changed)
     assert person.value("seed") == 0.1
     assert person.value("petiole") == (0.54, 0.3, 0.83)
-    monkeypatch.setattr("explorer.viewer.pour.pair_matrix.HANDS_OFF", 0.0)  # the person has let go
+    monkeypatch.setattr("explorer.viewer.actions.HANDS_OFF", 0.0)  # the person has let go
     made.follow(changed)
     assert person.value("petiole") == (0.54, 0.2, 0.83)
+
+
+def test_the_solver_does_not_take_back_a_box_before_the_call_of_it_comes(server):
+    made, person, sent = matrix(server)
+    person.send("seed", 0.2, before_call=lambda: made.follow(SCENE))
+    assert sent == [{"pair.seed.seed.static_friction": 0.2}]
+
+
+@pytest.mark.parametrize("name", ["petiole", "seed"])
+def test_a_number_that_is_none_is_no_hand(server, name, monkeypatch):
+    made, person, _ = matrix(server)
+    monkeypatch.setattr("explorer.viewer.actions.HANDS_OFF", 0.0)
+    before = person.value(name)
+    with pytest.raises(InputError):
+        person.send(name, math.nan if name == "seed" else (math.nan,) * 3)
+    made.follow(SCENE)
+    assert person.value(name) == before
 
 
 def test_the_table_is_symmetric_and_tells_what_is_missing():

@@ -105,8 +105,9 @@ def test_the_profiles_of_the_study_file_are_offered_and_started(server, tmp_path
     assert [one[:2] for one in table.study.asked] == [("start", "first look"), ("queue", "thesis-2")]
 
 
-def test_a_browser_chooses_between_the_scheduler_of_the_server_and_this_machine(server):
+def test_a_browser_chooses_between_the_scheduler_of_the_server_and_this_machine(server, monkeypatch):
     """And names none itself: what another scheduler sends would be run here."""
+    monkeypatch.setattr("explorer.viewer.actions.HANDS_OFF", 0.0)
     place, at = PourPlace("tcp://127.0.0.1:9"), "tcp://127.0.0.1:9"
     table = PanelAtHand(server, place)
     person = table.person
