@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -32,6 +32,7 @@ import numpy.typing as npt
 from scipy import stats
 from scipy.special import logsumexp
 
+from doe.analysis.cells import CELL, NEGLIGIBLE, Places, parted_cells
 from doe.analysis.covariance import log_t
 from doe.declared.bodies import BodyEvidence
 from doe.diagnose.emulator import ANGLES, Emulator, planar_weights
@@ -49,7 +50,7 @@ TEMPERATURE = 0.7
 wrong name counts as ten sets without one. On reference pours judged by the pours that teach a model (``docs/limit.md``,
 9) none of 244 is named wrongly at 0.7, and up to four are at 1. ``explorer validate-diagnosis`` prints what other
 temperatures would have made of its sets."""
-LEAST, STEP, BEYOND = 0.12, 1.15, 1.6
+LEAST, STEP, BEYOND = 0.12, 1.05, 1.6
 """Least multiple of the reference amplitude (an effect of 12 σ can hardly be seen there), factor between two of them,
 and how far beyond what has been poured a model is extrapolated."""
 DIRECTIONS = 24
@@ -65,8 +66,6 @@ is missing, the most probable single effect may be the stronger one of two."""
 SECOND = 4.0
 """Least shift by either of two effects [standard errors of the data]: a second one that nobody could see would take its
 share of the probability from the first alone."""
-COARSE = 3
-"""Every so many amplitudes and directions of a member of a pair are summed."""
 AT_ONCE = 20_000
 """Nodes that are weighed at once."""
 STEPS, FARTHEST = 4, 4.0
@@ -192,8 +191,9 @@ def holds(one: str, other: str) -> bool:
 class _Nodes:
     """Amplitudes over which the evidence of a model is summed, with the rows of the regression.
 
-    ``natural``: (n, p) of all its effects in turn. ``ends``: where an amplitude is the largest. ``levels``: the way and
-    multiple that a node is, of one effect. ``step``: factor from one amplitude to the next.
+    ``natural``: (n, p) of all its effects in turn. ``ends``: where an amplitude is the largest. ``way``, ``multiple``:
+    the way and multiple that a node is, of one effect. ``step``: factor from one amplitude to the next. ``share``: log
+    of the share of the prior that each stands for; the same of all where it is empty.
     """
 
     rows: FloatArray
@@ -202,14 +202,7 @@ class _Nodes:
     way: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     multiple: FloatArray = field(default_factory=lambda: np.zeros(0))
     step: float = STEP
-
-    def every(self, step: int) -> _Nodes:
-        """Every ``step``-th node, beginning in the middle of the first ``step``."""
-        return self.only(slice(min(step // 2, len(self.rows) - 1), None, step))
-
-    def only(self, some: slice | npt.NDArray[np.bool_]) -> _Nodes:
-        """Some of them."""
-        return _Nodes(self.rows[some], self.natural[some], self.ends[some], self.way[some], self.multiple[some])
+    share: FloatArray = field(default_factory=lambda: np.zeros(0))
 
 
 def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, pairs: bool = True) -> Posterior:
@@ -249,7 +242,7 @@ def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, 
         and len(singles) > 1
         and math.exp(nothing - logsumexp([nothing, outside, *weighed.values()])) < PAIRED_BELOW
     ):
-        found = _pairs(weigher, singles)
+        found = _pairs(weigher, singles, SECOND, max(fit.log_evidence for fit in fits.values()) - NEGLIGIBLE)
         fits |= found
         each = PAIRS / (0.5 * number * (number - 1))
         weighed |= {label: _weight(each, fit.log_evidence, temperature) for label, fit in found.items()}
@@ -274,7 +267,7 @@ def fitted(emulator: Emulator, data: Data, label: str) -> Fit:
     """The best fit of one model: "base", an effect, or "a+b"."""
     weigher = _Weigher(emulator, data)
     if "+" in label:
-        return _pairs(weigher, {name: _nodes_of(emulator, name) for name in label.split("+")}, least=0.0)[label]
+        return _pairs(weigher, {name: _nodes_of(emulator, name) for name in label.split("+")}, 0.0, -math.inf)[label]
     nodes = weigher.base if label == "base" else _nodes_of(emulator, label)
     return weigher.fit(label, nodes, weigher.densities(label, nodes))
 
@@ -335,27 +328,39 @@ def _top(emulator: Emulator, way: int) -> float:
 
 
 def multiples(top: float) -> FloatArray:
-    """From ``LEAST`` to ``top``, evenly over the logarithm."""
-    if top <= LEAST:
-        return np.array([top])
-    return np.geomspace(LEAST, top, max(2, 1 + round(math.log(top / LEAST) / math.log(STEP))))
+    """From ``LEAST`` to ``top``, evenly over the logarithm, in whole cells."""
+    return np.geomspace(min(LEAST, top), top, CELL * max(1, round(math.log(top / LEAST) / math.log(STEP) / CELL)))
 
 
-def _pairs(weigher: _Weigher, singles: Mapping[str, _Nodes], least: float = SECOND) -> dict[str, Fit]:
-    """Fits of every two effects acting at once, each shifting the data by ``least`` standard errors."""
-    seen = {name: nodes.only(weigher.shifts(nodes.rows) >= least) for name, nodes in singles.items()}
-    coarse = {name: nodes.every(COARSE) for name, nodes in seen.items() if len(nodes.rows)}
-    found = {}
-    for first, second in combinations(coarse, 2):
-        one, other = coarse[first], coarse[second]
-        i, j = (
-            grid.reshape(-1) for grid in np.meshgrid(*(np.arange(len(n.rows)) for n in (one, other)), indexing="ij")
-        )
-        natural = np.concatenate([one.natural[i], other.natural[j]], axis=1)
-        rows, ends = one.rows[i] + other.rows[j] - weigher.base.rows, one.ends[i] | other.ends[j]
-        nodes, label = _Nodes(rows, natural, ends, step=STEP**COARSE), f"{first}+{second}"
-        found[label] = weigher.fit(label, nodes, weigher.densities(label, nodes))
+def _pairs(weigher: _Weigher, singles: Mapping[str, _Nodes], least: float, floor: float) -> dict[str, Fit]:
+    """Fits of every two effects acting at once, each shifting the data by ``least`` standard errors; coarse ones where
+    the log evidence does not come up to ``floor``, or near that of another pair.
+    """
+    shifts = {name: weigher.shifts(nodes.rows) for name, nodes in singles.items()}
+    found: dict[str, Fit] = {}
+    for first, second in combinations([name for name in singles if shifts[name].max() >= least], 2):
+        label, members = f"{first}+{second}", (singles[first], singles[second])
+        found[label] = _pair(weigher, label, members, (shifts[first], shifts[second]), least, floor)
+        floor = max(floor, found[label].log_evidence - NEGLIGIBLE)
     return found
+
+
+def _pair(
+    weigher: _Weigher, label: str, members: Sequence[_Nodes], shifts: Sequence[FloatArray], least: float, floor: float
+) -> Fit:
+    one, other = members
+
+    def at(i: Places, j: Places, step: float = STEP) -> _Nodes:
+        natural = np.concatenate([one.natural[i], other.natural[j]], axis=1)
+        return _Nodes(one.rows[i] + other.rows[j] - weigher.base.rows, natural, one.ends[i] | other.ends[j], step=step)
+
+    cells = parted_cells(
+        lambda i, j, size: weigher.densities(label, at(i, j, STEP**size)),
+        [math.log(STEP) * shift for shift in shifts],
+        [shift >= least for shift in shifts],
+        floor,
+    )
+    return weigher.fit(label, replace(at(cells.first, cells.second), share=cells.share), cells.logs)
 
 
 class _Weigher:
@@ -419,7 +424,8 @@ class _Weigher:
         if self._data.bodies is not None:
             square -= 2.0 * float(self.of_bodies(label, nodes)[best])
             numbers += len(self._data.bodies.off)
-        weights = np.exp(logs - logsumexp(logs))
+        weighed = logs + (nodes.share if len(nodes.share) else -math.log(len(logs)))
+        weights = np.exp(weighed - logsumexp(weighed))
         sizes = {way.effect: len(way.unit) for way in self._emulator.ways}
         effects = [] if label == "base" else label.split("+")
         owners = [(effect, index) for effect in effects for index in range(sizes[effect])]
@@ -437,7 +443,7 @@ class _Weigher:
             noise,
             mean,
             self._emulator.at(nodes.rows[best : best + 1])[1][0],
-            float(logsumexp(logs)) - math.log(len(logs)),
+            float(logsumexp(weighed)),
             float(stats.f.sf(square / numbers, numbers, self._freedom)),
         )
 

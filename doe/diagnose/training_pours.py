@@ -121,8 +121,8 @@ class TrainingPours:
         self._keep_trials()
         for direction, level in zip(self._directions, self._levels, strict=True):
             if not direction.angle:
-                reach = f"up to {_words(direction, level.share)}, which shifts by {level.shift:.1f} standard errors"
-                say(f"{direction.name}: {reach}")
+                reach = " ".join(f"{one:.3g}" for one in direction.at(level.share))
+                say(f"{direction.name}: up to {reach}, which shifts by {level.shift:.1f} standard errors")
         say(f"screening: {len(self._rows)} settings of {len(declared.effects)} effects")
 
     @property
@@ -390,14 +390,11 @@ class TrainingPours:
         base = found.fits["base"].log_evidence
         ends = []
         for level in sorted(found.levels, key=lambda one: -one.log_density):
-            way, reached = self.ways[level.way], self._reached(level.way)
+            way, reached = self.ways[level.way], max(a for one, a in self._acting.values() if one == level.way)
             further = min(2.0 * reached, way.most)
             if level.log_density - base > FURTHER and level.amplitude > reached and further > 1.001 * reached:
                 ends.append((level.way, further))
         return ends[:FOLLOWED]
-
-    def _reached(self, way: int) -> float:
-        return max(multiple for one, multiple in self._acting.values() if one == way)
 
 
 def acting(found: Posterior, label: str, ways: Sequence[Way]) -> list[tuple[int, float]]:
@@ -441,7 +438,3 @@ def unchanged_by_a_quarter_turn(scene: Scene) -> bool:
     """Whether a quarter turn leaves the declared ``scene`` as it is."""
     found = actual(scene)
     return pour_rig(found).quarter_turns and found.gravity[0] == found.gravity[1] == 0.0 and not any(found.axis)
-
-
-def _words(direction: Direction, share: float) -> str:
-    return " ".join(f"{one:.3g}" for one in direction.at(share))

@@ -160,7 +160,6 @@ def test_a_planted_effect_is_named_with_its_amplitude(measurement, monkeypatch):
     overall = next(one for one in found.fit_error if one.observable == "overall")
     beyond_noise = [error**2 - overall.noise_floor**2 for error in (overall.before, overall.after)]
     assert beyond_noise[1] < 0.25 * beyond_noise[0]
-    assert found.held_out is not None
     assert found.held_out.p >= CONTRADICTED
 
 
@@ -251,7 +250,8 @@ def test_what_the_data_cannot_tell_apart_is_ambiguous_and_gets_a_next_experiment
     measurement, monkeypatch, hidden, bodies
 ):
     planted = ((hidden, (0.5 * EFFECTS[hidden].strongest,)),)
-    found, said = run(measurement, monkeypatch, planted, formula=partial(twins, hidden=hidden), held_out=())
+    measurement = replace(measurement, conditions=measurement.fit)
+    found, said = run(measurement, monkeypatch, planted, formula=partial(twins, hidden=hidden))
     assert found.verdict.kind.startswith("ambiguous:"), said
     assert {hidden, "rolling_resistance"} <= set(found.verdict.names)
     assert found.suggestions[0].levers
@@ -319,10 +319,10 @@ def test_an_effect_that_two_looks_leave_named_gets_no_third(steps, looks, monkey
 
 
 def test_what_could_be_measured_next_is_left_out_where_it_is_not_wanted(measurement, monkeypatch):
-    measure(monkeypatch, (("air_drag", (1.0,)),), 1, twins, held_out=())
-    found = diagnosis.run_diagnosis(measurement, None, None, NAMES, BUDGET, print, plan_next=False)
-    assert found.verdict.kind.startswith("ambiguous:")
-    assert found.suggestions == ()
+    measure(monkeypatch, (("air_drag", (1.0,)),), 1, twins)
+    only_fitted = replace(measurement, conditions=measurement.fit)
+    found = diagnosis.run_diagnosis(only_fitted, None, None, NAMES, BUDGET, print, plan_next=False)
+    assert (found.verdict.kind[:10], found.suggestions) == ("ambiguous:", ())
 
 
 def test_held_out_data_take_a_name_back(measurement, monkeypatch):

@@ -1,0 +1,53 @@
+"""The evidence of two effects at once, where data fix one of them far more closely than amplitudes are first tried."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+
+from doe.analysis.cells import CELL
+from doe.diagnose import posterior
+from doe.diagnose.posterior import SECOND, Data
+from tests.doe.diagnose.test_posterior import emulator
+from tests.doe.validation.test_limit_ruler import unit
+
+
+def over_every_node(taught, data, first, second):
+    """Log evidence of a pair by all amplitudes of both that could be seen."""
+    weigher = posterior._Weigher(taught, data)
+    one, other = (posterior._nodes_of(taught, name) for name in (first, second))
+    i, j = (np.flatnonzero(weigher.shifts(nodes.rows) >= SECOND) for nodes in (one, other))
+    rows = (one.rows[i][:, None] + other.rows[j][None] - weigher.base.rows).reshape(-1, one.rows.shape[1])
+    return float(logsumexp(weigher.log_t(*weigher.at(rows)))) - math.log(len(rows))
+
+
+def test_a_strong_effect_s_amplitude_is_summed_finely_enough_beside_a_weak_one():
+    """Of 20 deviations of a pour: means of six tell its amplitude to 2 per cent; a first cell is 1.55 times wide."""
+    shifts = {"strong": 20.0 * unit(0), "weak": 4.0 * unit(3), "turn": 4.0 * unit(5)}
+    taught = emulator(shifts, variance=25.0, pours=400)
+    off, chances = [], []
+    for amplitude in np.geomspace(0.8, 1.24, 8):
+        data = Data(amplitude * shifts["strong"] + 0.8 * shifts["weak"], 6)
+        found = posterior.posterior(taught, data, temperature=1.0)
+        wanted = over_every_node(taught, data, "strong", "weak")
+        assert found.fits["strong+weak"].log_evidence == pytest.approx(wanted, abs=0.3)
+        chances.append(found.effects["strong+weak"])
+        coarse = posterior._pairs(
+            posterior._Weigher(taught, data),
+            {name: posterior._nodes_of(taught, name) for name in ("strong", "weak")},
+            SECOND,
+            math.inf,
+        )
+        off.append(coarse["strong+weak"].log_evidence - wanted)
+    assert min(chances) > 0.95
+    # What the middles of the first cells alone would make of it.
+    assert min(off) < -10.0
+
+
+def test_amplitudes_come_in_whole_cells():
+    for top in (0.1, 0.12, 0.3, 1.6, 16.0):
+        found = posterior.multiples(top)
+        assert len(found) % CELL == 0
+        assert found[-1] == pytest.approx(top)
+        assert found[0] == pytest.approx(min(posterior.LEAST, top))
