@@ -1,17 +1,7 @@
 """Confirmation by fresh pours: both models at their best fits, in the fitted and in the held-out conditions.
 
 The seeds are those of no pour that taught a model. Held-out data never choose: they report the error, and they may take
-an answer back. The farthest summary of the final model over all held-out conditions is
-
-    |t| = max |measured − poured| / (s √(1/(k r) + 1/m))
-
-with r measured replicates, each the mean of k pours, and m fresh pours, s the deviation of a pour pooled over both and
-f = r + m − 2 degrees of freedom. For a single one s is that of the fresh pours alone, and the uncertainty u stated of
-its instrument comes in: below the bar stands √(s² (1/k + 1/m) + u²), with f (1 + u²/(s² (1/k + 1/m)))² of freedom
-(Welch and Satterthwaite, doi 10.2307/3002019). Bonferroni's p = (number of summaries) P(|t_f| ≥ |t|) is summary by
-summary because what is missing shows in what it acts on, not evenly over all. With the probability p₀ of fitted data
-as far off the same model it contradicts the answer where Fisher's P = q (1 − ln q), q = p p₀, is below ``CONTRADICTED``
-(Statistical Methods for Research Workers, 1932, 21.1): a wrong model is often somewhat off in both.
+an answer back (``doe/holdout.py``).
 
 Of scanned piles the same pours show where on the plate the residual sits. Nothing is decided by that.
 """
@@ -19,29 +9,22 @@ Of scanned piles the same pours show where on the plate the residual sits. Nothi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
 
 from doe.declared.model import Declared
 from doe.declared.points import Point
 from doe.declared.pours import ModelPours, PointPour
 from doe.diagnose.posterior import Fit
-from doe.diagnose.result import CalibratedModel, HeldOut
-from doe.holdout import MeasuredReplicates
+from doe.diagnose.result import CalibratedModel
 from doe.measurement.features import coarse_map
 from doe.measurement.measurement import Condition
 from doe.measurement.piles import PileSurface
 from doe.measurement.residual_map import ResidualMap, height_difference
 
 FloatArray = npt.NDArray[np.float64]
-
-CONTRADICTED = 0.01
-"""Of 255 right names and "nothing missing" (roots 1 to 3) none is below, six of 16 names for what is outside are."""
-CONSTANT_FLOOR = 1e-3
-"""Least standard deviation of a summary, as a share of its size."""
 
 
 def model_of(fit: Fit, declared: Declared) -> CalibratedModel:
@@ -100,32 +83,6 @@ def _confirmed(model: CalibratedModel, rows: Sequence[Sequence[PointPour]], widt
         blocks.append(np.array([pour.summaries for pour in valid]).reshape(len(valid), width))
         profiles.append(np.array([pour.profile for pour in valid]).reshape(len(valid), -1 if valid else 0))
     return Confirmed(model, tuple(blocks), broken, tuple(profiles))
-
-
-def held_out(
-    label: str, data: Sequence[MeasuredReplicates], poured: Sequence[FloatArray], fit: float = 1.0
-) -> HeldOut | None:
-    """Compare ``data`` with fresh pours (m, d) of the model ``label``; None where nothing can be compared."""
-    worst: HeldOut | None = None
-    asked = 0
-    for one, block in zip(data, poured, strict=True):
-        r, m = len(one.values), len(block)
-        if r < 1 or m < 2:
-            continue
-        floor = CONSTANT_FLOOR * np.abs(np.concatenate([one.values, block])).max(axis=0)
-        spread = np.maximum(one.deviation_of_a_pour(block), floor)
-        if not (varies := spread > 0.0).any():
-            continue
-        asked += int(varies.sum())
-        scatter = np.where(varies, spread, 1.0) ** 2 * (one.share / r + 1 / m)
-        variance = scatter + one.instrument**2
-        off = np.where(varies, np.abs(one.values.mean(axis=0) - block.mean(axis=0)), 0.0)
-        t = off / np.sqrt(variance)
-        tails = stats.t.sf(t, (r + m - 2) * (variance / scatter) ** 2)
-        k = int(np.lexsort((-t, tails))[0])
-        if worst is None or tails[k] < worst.p:
-            worst = HeldOut(label, one.condition, one.summaries[k], float(t[k]), float(tails[k]))
-    return None if worst is None else replace(worst, p=min(1.0, asked * 2.0 * worst.p), fit=fit)
 
 
 def residual_maps(

@@ -15,14 +15,14 @@ from doe.declared.model import Declared, declare
 from doe.declared.pours import ROOT, ModelPours, OnPour
 from doe.diagnose.candidate_experiments import CandidateExperiments, acting_in, checked_by_bodies, next_experiment
 from doe.diagnose.compared_features import Compared, measured, weighed
-from doe.diagnose.confirm import CONTRADICTED, Confirmed, confirm, held_out, model_of, residual_maps
+from doe.diagnose.confirm import Confirmed, confirm, model_of, residual_maps
 from doe.diagnose.emulator import Lessons
 from doe.diagnose.posterior import Posterior, gain_by_pours, holds
-from doe.diagnose.result import BASE, NO_EFFECT, HeldOut, Level, Offered, Suggestion
+from doe.diagnose.result import BASE, NO_EFFECT, Level, Offered, Suggestion
 from doe.diagnose.training_pours import Say, TrainingPours
 from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD, Verdict, candidate, taken_back, verdict_of
 from doe.errors import MeasurementError
-from doe.holdout import HoldoutCondition, HoldoutError, holdout_errors
+from doe.holdout import CONTRADICTED, HeldOut, HoldoutCondition, HoldoutError, held_out, holdout_errors
 from doe.measurement.bodies import MeasuredBody
 from doe.measurement.features import SCAN, feature_set
 from doe.measurement.measurement import Condition, Measurement

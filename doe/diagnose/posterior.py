@@ -15,9 +15,10 @@ about their best fit under each model, where J is the slope (Laplace), for the a
 holds the stated errors of instruments, r ≥ 1 is the variance of the data's replicates over the simulated one, or that
 of pours under the effect where it is more.
 The evidence of an effect is the mean over amplitudes, evenly over their logarithm, over its signs and over its
-directions in the plane; that of the outside over s. Two effects act by the sum of what each does. The posterior is
-P ∝ p Zᵀ for prior p, evidence Z and temperature T (``TEMPERATURE``): below one it is less sure than the evidence
-says, for features are not quite normal and models not quite linear.
+directions in the plane; that of the outside over s. Two effects act by the sum of what each does, and their amplitudes
+are summed as finely as the data tell them apart (``doe/analysis/cells.py``). The posterior is P ∝ p Zᵀ for prior p,
+evidence Z and temperature T (``TEMPERATURE``): below one it is less sure than the evidence says, for features are not
+quite normal and models not quite linear.
 """
 
 from __future__ import annotations

@@ -5,7 +5,6 @@ A label is ``BASE``, an effect, or a pair "a+b"; an answer is ``NO_EFFECT``, ``U
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -153,27 +152,6 @@ class CalibratedModel(Record):
     def name(self) -> str:
         """ "base", or the effects' names."""
         return "+".join(name for name, _ in self.effects) or BASE
-
-
-@dataclass(frozen=True)
-class HeldOut(Record):
-    """What fresh pours of a model say of held-out data: |t| of the farthest summary, which it is, Bonferroni's p.
-
-    ``fit``: p of the fitted data under that model; 1 where the answer leaves several.
-    """
-
-    label: str
-    condition: str
-    summary: str
-    farthest: float
-    p: float
-    fit: float = 1.0
-
-    @property
-    def together(self) -> float:
-        """Fisher's probability of both, P(U₁ U₂ ≤ q) = q (1 − ln q) with q their product."""
-        q = self.p * self.fit
-        return q * (1.0 - math.log(q)) if q > 0.0 else 0.0
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,6 @@ from doe.diagnose.result import (
     UNEXPLAINED,
     CalibratedModel,
     EffectRow,
-    HeldOut,
     Level,
     Offered,
     ParameterRow,
@@ -25,7 +24,7 @@ from doe.diagnose.result import (
     Residual,
     Suggestion,
 )
-from doe.holdout import OVERALL, HoldoutError
+from doe.holdout import OVERALL, HeldOut, HoldoutError
 from doe.measurement.measurement import Role
 from doe.measurement.residual_map import ResidualMap
 from doe.provenance import About

@@ -17,12 +17,12 @@ from doe.declared.budget import Budget, scaled_budget
 from doe.declared.given import Given, with_given
 from doe.declared.model import effect_values
 from doe.declared.pours import measured_profile
-from doe.diagnose.confirm import CONTRADICTED, Confirmed
+from doe.diagnose.confirm import Confirmed
 from doe.diagnose.diagnosis import Diagnosis, joined, run_diagnosis
 from doe.diagnose.posterior import FITS, NOTHING, OUTSIDE, PAIRS
 from doe.diagnose.training_amplitudes import STRONG
 from doe.diagnose.verdict import CREDIBLE, DOUBTED, NOTHING_AT_ONCE, NOTHING_FROM
-from doe.holdout import HoldoutError
+from doe.holdout import CONTRADICTED, HoldoutError
 from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summaries

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from doe.diagnose.result import NO_EFFECT, UNEXPLAINED, EffectRow, HeldOut, Place
+from doe.diagnose.result import NO_EFFECT, UNEXPLAINED, EffectRow, Place
 from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD
-from doe.holdout import OVERALL
+from doe.holdout import OVERALL, HeldOut
 from explorer.diagnosis.result import CORRECTED, CORRECTED_STUDY, DiagnosisResult, ErrorRow, Kind, answers
 from explorer.report.content import Banner, Block, Bullets, Caution, Facts, Figure, Section, Table, Text, Word
 from explorer.report.diagnosis.charts import likely, probability_chart

@@ -9,8 +9,8 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-from doe.diagnose.result import BASE, NO_EFFECT, UNEXPLAINED, Amplitude, EffectRow, HeldOut, Place
-from doe.holdout import OVERALL
+from doe.diagnose.result import BASE, NO_EFFECT, UNEXPLAINED, Amplitude, EffectRow, Place
+from doe.holdout import OVERALL, HeldOut
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.units import (
     MISSING,

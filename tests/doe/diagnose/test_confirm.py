@@ -9,9 +9,9 @@ import pytest
 from scipy import stats
 
 from doe.declared.model import CalibratedParameter, CandidateEffect, Declared
-from doe.diagnose.confirm import CONTRADICTED, Confirmed, confirming, held_out, model_of, residual_maps
-from doe.diagnose.result import Amplitude, CalibratedModel, HeldOut
-from doe.holdout import MeasuredReplicates
+from doe.diagnose.confirm import Confirmed, confirming, model_of, residual_maps
+from doe.diagnose.result import Amplitude, CalibratedModel
+from doe.holdout import CONTRADICTED, HeldOut, MeasuredReplicates, held_out
 from doe.measurement import load_measurement
 from doe.measurement.piles import PileSurface
 from doe.measurement.residual_map import LEAST_ERROR, height_difference

@@ -20,12 +20,12 @@ from doe.declared.points import AS_IT_IS
 from doe.declared.pours import PointPour
 from doe.diagnose import diagnosis, training_pours
 from doe.diagnose.compared_features import MeasuredFeatures
-from doe.diagnose.confirm import CONTRADICTED
-from doe.diagnose.posterior import BestAmplitude, Posterior
+from doe.diagnose.posterior import BestAmplitude
 from doe.diagnose.result import CalibratedModel, Level
 from doe.diagnose.training_amplitudes import REPLICATES, whitened_shift
 from doe.diagnose.training_pours import TrainingPours
 from doe.errors import StatisticsError
+from doe.holdout import CONTRADICTED
 from doe.measurement import load_measurement, summary_names
 from doe.measurement.features import SCAN, feature_set
 from solver import EFFECTS
@@ -272,50 +272,6 @@ def test_no_more_is_poured_where_the_noise_of_the_data_hides_what_is_between_two
         looks[instrument] = sum(line.startswith("after a closer look") for line in said)
         assert any(line.startswith("no pours can tell ") for line in said) == (instrument == 2.0), said
     assert looks == {0.05: BUDGET.looks, 2.0: 1}
-
-
-class Rehearsed:
-    """Training pours whose every look ends with the next of the posteriors in ``steps``: name and probability."""
-
-    def __init__(self, steps):
-        self._steps, self.looks, self.ways, self.declared = iter(steps), 0, (), None
-        self.instruments = lambda data: []
-
-    def compared(self, *_, **__):
-        name, p = next(self._steps)
-        odds = {"a": 0.1 * (1.0 - p), "b": 0.1 * (1.0 - p)} | {name: p}
-        fit = SimpleNamespace(p=0.01)
-        found = Posterior(0.0, 1.0 - sum(odds.values()), odds, {"base": fit, "a": fit, "b": fit}, (), 0.0)
-        return SimpleNamespace(posterior=found, refitted=lambda labels: labels)
-
-    def look(self, found):
-        self.looks += 1
-        return ("a", "b")
-
-    def lessons(self): ...
-    def refine(self, found, label): ...
-    def at_end(self, found):
-        return []
-
-
-@pytest.mark.parametrize(
-    ("steps", "looks"),
-    [
-        ([("a", 0.93), ("a", 0.93), ("a", 0.91), ("a", 0.93)], 2),
-        ([("a", 0.5), ("a", 0.93), ("a", 0.97), ("a", 0.97)], 2),
-        ([("a", 0.93), ("a", 0.96), ("a", 0.96)], 1),
-        # Lost once, it has to hold twice anew; and what holds is one and the same.
-        ([("a", 0.5), ("a", 0.93), ("a", 0.85), ("a", 0.93), ("a", 0.94), ("a", 0.94)], 4),
-        ([("a", 0.5), ("a", 0.93), ("b", 0.93), ("a", 0.93), ("b", 0.93), ("b", 0.93)], 4),
-    ],
-)
-def test_an_effect_that_two_looks_leave_named_gets_no_third(steps, looks, monkeypatch):
-    # The posterior once it is poured on both sides of its best fit comes last.
-    training = Rehearsed(steps)
-    monkeypatch.setattr(diagnosis, "weighed", training.compared)
-    monkeypatch.setattr(diagnosis, "inseparable", lambda compared, name: "")
-    diagnosis.pursued(training, SimpleNamespace(fit=(), bodies=()), Budget(), print, None)
-    assert training.looks == looks
 
 
 def test_what_could_be_measured_next_is_left_out_where_it_is_not_wanted(measurement, monkeypatch):
