@@ -349,6 +349,7 @@ def _pairs(weigher: _Weigher, singles: Mapping[str, _Nodes], least: float, floor
 def _pair(
     weigher: _Weigher, label: str, members: Sequence[_Nodes], shifts: Sequence[FloatArray], least: float, floor: float
 ) -> Fit:
+    """The fit of ``members`` acting at once, whose nodes shift the data by ``shifts``."""
     one, other = members
 
     def at(i: Places, j: Places, step: float = STEP) -> _Nodes:
