@@ -92,11 +92,21 @@ class SharedBox:
         """Whether a person is at it, or was ``HANDS_OFF`` ago."""
         # `in` and not `==`: a browser may send NaN, which is the same thing and yet not equal.
         if self.handle.value not in (self._known,):
-            self.touch()
+            self._touch()
         return time.monotonic() < self._touched + HANDS_OFF
 
-    def touch(self) -> None:
-        """Note that a person entered what it shows."""
+    def listen(self, post: Post, take: Callable[[Any], None]) -> None:
+        """Hand what a person enters, and not what the program shows, to ``take`` on the loop."""
+
+        def entered(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                sent = event.target.value
+                self._touch()
+                post(lambda: take(sent))
+
+        self.handle.on_update(entered)
+
+    def _touch(self) -> None:
         self._touched, self._known = time.monotonic(), self.handle.value
 
     def show(self, value: Any) -> None:

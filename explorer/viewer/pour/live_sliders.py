@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import viser
 
@@ -81,14 +80,7 @@ class LiveControl:
         return screen_unit(self._parameter).to_screen(float(value(scene, self._paths[0])))
 
     def _listen(self, face: Face, post: Post, apply: Apply) -> None:
-        def entered(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is None:  # set by follow(), not by a person
-                return
-            number = event.target.value
-            face.box.touch()
-            post(lambda: apply(self._values(face.read(number))))
-
-        face.box.handle.on_update(entered)
+        face.box.listen(post, lambda number: apply(self._values(face.read(number))))
 
     def _values(self, number: float) -> Mapping[str, float | str]:
         return dict.fromkeys(self._paths, screen_unit(self._parameter).to_si(number))

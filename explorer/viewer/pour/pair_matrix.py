@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from html import escape
 from typing import Any
 
@@ -35,7 +36,7 @@ class PairMatrix:
             self._table = gui.add_html(matrix_html(scene, self._parameter, name))
             self._rows = [self._row(gui, scene, one, others) for one, others in triangle(scene)]
         for row in self._rows:
-            self._listen(row, post)
+            row.box.listen(post, partial(self._take, row))
 
     def follow(self, scene: Scene) -> None:
         """Show the solver's values, but not in a row that a person is at."""
@@ -62,16 +63,6 @@ class PairMatrix:
 
     def _numbers(self, scene: Scene, paths: tuple[str, ...]) -> tuple[float, ...]:
         return tuple(screen_unit(self._parameter).to_screen(float(value(scene, path))) for path in paths)
-
-    def _listen(self, row: PairRow, post: Post) -> None:
-        def entered(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is None:  # set by follow(), not by a person
-                return
-            sent = event.target.value
-            row.box.touch()
-            post(lambda: self._take(row, sent))
-
-        row.box.handle.on_update(entered)
 
     def _take(self, row: PairRow, sent: object) -> None:
         """Set those pairs of a row whose box shows another number than before."""

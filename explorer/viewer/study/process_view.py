@@ -84,14 +84,8 @@ class PlaceChoice:
             return
         hint = f"Where the next {what} pours, also one that is resumed: on the workers of a Dask scheduler, or here."
         offered = server.gui.add_dropdown("Pour on", place.offered, initial_value=place.chosen, hint=hint)
-        self._box = box = SharedBox(offered)
-
-        @offered.on_update
-        def _(event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
-            if event.client_id is not None:  # not what the panel itself sets
-                sent = str(event.target.value)
-                box.touch()
-                post(lambda: place.choose(sent))
+        self._box = SharedBox(offered)
+        self._box.listen(post, lambda sent: place.choose(str(sent)))
 
     def show(self) -> None:
         """What was chosen, perhaps in another panel."""
