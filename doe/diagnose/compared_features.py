@@ -3,7 +3,7 @@
 A feature is compared where the data offer it in at least two replicates and half of them (in the one that there is),
 where ``READABLE`` of the base model's pours give it, and where it varies at all in the pours. What the data offer is a
 matter of names (``doe/measurement/features.py``), so nothing here looks at a value and chooses. Whether a model fits is
-asked of the replicates without outliers (``outlier_weights``); all of them weigh one model against another.
+asked of the replicates without outliers (``Compared.asked_of_typical``); all of them weigh one model against another.
 """
 
 from __future__ import annotations
@@ -92,6 +92,8 @@ class Compared:
         "condition: feature" of what the data offer and no pour varies or gives.
     data, emulator, posterior
         What is weighed, by what, and what came out.
+    typical
+        The data of the replicates without outliers; ``data`` itself where there are none.
     blocks
         Measured replicates, by condition (r, d_c).
     plain
@@ -104,9 +106,22 @@ class Compared:
     left_out: tuple[str, ...]
     blocks: tuple[FloatArray, ...]
     data: Data
+    typical: Data
     emulator: Emulator
     posterior: Posterior
     plain: Emulator
+
+    def asked_of_typical(self, labels: Sequence[str]) -> Compared:
+        """The same with the p of ``labels`` by the replicates without outliers.
+
+        A pile that came down in a lump may tell one effect from another, but a model is of what piles are on average.
+        """
+        if self.typical is self.data:
+            return self
+        fits = dict(self.posterior.fits)
+        for label in labels:
+            fits[label] = replace(fits[label], p=fitted(self.emulator, self.typical, label).p)
+        return replace(self, posterior=replace(self.posterior, fits=fits))
 
     def refitted(self, labels: Sequence[str]) -> Compared:
         """The same with the fits of ``labels`` by the plain emulator, their evidence as it was."""
@@ -171,17 +186,14 @@ def weighed(
         _loadings(emulator, blocks, conditions, columns, instruments),
         bodies,
     )
-    found = posterior(emulator, data)
-    shares, scatter = outlier_weights(*pours)
+    typical, (shares, scatter) = data, outlier_weights(*pours)
     if any(one.min() < 1.0 for one in shares):
-        # A pile that came down in a lump may tell one effect from another, but a model is of what piles are on average.
         number = data.replicates * float(np.mean([one.mean() for one in shares]))
         typical = replace(data, z=emulator.seen(blocks, shares), replicates=number, scatter=scatter)
-        fits = {label: replace(fit, p=fitted(emulator, typical, label).p) for label, fit in found.fits.items()}
-        found = replace(found, fits=fits)
     names = tuple(tuple(one.names[k] for k in chosen) for one, chosen in zip(conditions, columns, strict=True))
     labels = tuple(one.condition for one in conditions)
-    return Compared(labels, names, tuple(left_out), blocks, data, emulator, found, plain)
+    found = posterior(emulator, data)
+    return Compared(labels, names, tuple(left_out), blocks, data, typical, emulator, found, plain)
 
 
 def usable(lessons: Lessons, offered: Sequence[npt.NDArray[np.int64]]) -> tuple[Lessons, list[npt.NDArray[np.int64]]]:

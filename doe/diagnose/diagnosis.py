@@ -20,7 +20,7 @@ from doe.diagnose.emulator import Lessons
 from doe.diagnose.posterior import Posterior, gain_by_pours, holds
 from doe.diagnose.result import BASE, NO_EFFECT, Level, Offered, Suggestion
 from doe.diagnose.training_pours import Say, TrainingPours
-from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD, Verdict, candidate, taken_back, verdict_of
+from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD, Verdict, candidate, read_in, taken_back, verdict_of
 from doe.errors import MeasurementError
 from doe.holdout import CONTRADICTED, HeldOut, HoldoutCondition, HoldoutError, held_out, holdout_errors
 from doe.measurement.bodies import MeasuredBody
@@ -179,7 +179,7 @@ def pursued(
             compared = weigh(training.lessons())
             say(f"with pours on both sides of its best fit: {odds(compared.posterior)}")
             compared = compared.refitted(("base", compared.posterior.best[0]))
-    return compared
+    return compared.asked_of_typical(read_in(compared.posterior))
 
 
 def _settled(

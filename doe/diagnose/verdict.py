@@ -113,10 +113,7 @@ def answer(found: Posterior, followed_up: bool) -> tuple[str, tuple[str, ...], s
     if found.outside >= max(found.nothing, p):
         text = f"Something is missing that no effect of the library explains (probability {_percent(found.outside)})."
         return UNEXPLAINED, (), text
-    everything = {**found.effects, NO_EFFECT: found.nothing, UNEXPLAINED: found.outside}
-    order = sorted(everything, key=lambda one: -everything[one])
-    last = int(np.searchsorted(np.cumsum([everything[one] for one in order]), CREDIBLE)) + 1
-    rivals = order[:last]
+    everything, rivals = _everything(found), _credible(found)
     if sure >= THRESHOLD and not doubted and NO_EFFECT not in rivals:
         rivals.append(NO_EFFECT)
     names = tuple(one for one in rivals if one in found.effects)
@@ -125,6 +122,29 @@ def answer(found: Posterior, followed_up: bool) -> tuple[str, tuple[str, ...], s
         return UNEXPLAINED, (), text
     odds = ", ".join(f"{_spoken(one)} {_percent(everything[one])}" for one in rivals)
     return f"ambiguous:{','.join(rivals)}", names, f"The data leave several answers: {odds}."
+
+
+def read_in(found: Posterior) -> list[str]:
+    """Models whose fits an answer or its table may name."""
+    singles = [label for label in found.effects if "+" not in label]
+    pairs = [label for label in _credible(found) if "+" in label]
+    return list(dict.fromkeys(["base", *singles, *pairs, *_likely_pairs(found)]))
+
+
+def _everything(found: Posterior) -> dict[str, float]:
+    return {**found.effects, NO_EFFECT: found.nothing, UNEXPLAINED: found.outside}
+
+
+def _credible(found: Posterior) -> list[str]:
+    """The smallest set of answers that holds ``CREDIBLE``, the most probable first."""
+    everything = _everything(found)
+    order = sorted(everything, key=lambda one: -everything[one])
+    return order[: int(np.searchsorted(np.cumsum([everything[one] for one in order]), CREDIBLE)) + 1]
+
+
+def _likely_pairs(found: Posterior) -> list[str]:
+    pairs = [label for label in found.effects if "+" in label]
+    return sorted(pairs, key=lambda one: -found.effects[one])[:MOST_PAIRS]
 
 
 def in_doubt(found: Posterior, sure: float) -> bool:
@@ -155,7 +175,7 @@ def verdict_of(compared: Compared, declared: Declared, pours: Sequence[int], fol
     before, after = found.fits["base"], found.fits[final]
     white = _Recalibrated(compared)
     rows = sorted(found.effects, key=lambda one: -found.effects[one])
-    likely = [label for label in rows if "+" in label][:MOST_PAIRS]
+    likely = _likely_pairs(found)
     rows = [label for label in rows if "+" not in label or label in likely]
     return Verdict(
         kind=kind,

@@ -92,7 +92,7 @@ def test_a_pile_that_came_down_in_a_lump_is_no_evidence_against_a_model():
             MeasuredFeatures(name, "scan", names, block, np.zeros(45), scalars=1)
             for name, block in zip(("low", "high"), piles, strict=True)
         ]
-        return weighed(taught, WAYS, conditions).posterior.fits["base"].p
+        return weighed(taught, WAYS, conditions).asked_of_typical(["base"]).posterior.fits["base"].p
 
     assert p_of(piles) > 0.1
     assert p_of(lump) > 0.1

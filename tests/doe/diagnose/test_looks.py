@@ -21,7 +21,9 @@ class Rehearsed:
         odds = {"a": 0.1 * (1.0 - p), "b": 0.1 * (1.0 - p)} | {name: p}
         fit = SimpleNamespace(p=0.01)
         found = Posterior(0.0, 1.0 - sum(odds.values()), odds, {"base": fit, "a": fit, "b": fit}, (), 0.0)
-        return SimpleNamespace(posterior=found, refitted=lambda labels: labels)
+        compared = SimpleNamespace(posterior=found)
+        compared.refitted = compared.asked_of_typical = lambda labels: compared
+        return compared
 
     def look(self, found):
         self.looks += 1

@@ -170,7 +170,9 @@ def test_a_follow_up_begins_with_what_taught_the_answers_before_it(data, monkeyp
         p = 0.99 if bodies else (0.5, 0.8, 0.97)[training.looks]
         fit = SimpleNamespace(p=0.5)
         found = Posterior(1.0 - p, 0.0, {"a": p}, {"base": fit, "a": fit}, (), 0.0)
-        return SimpleNamespace(posterior=found, refitted=lambda labels: bodies)
+        compared = SimpleNamespace(posterior=found, bodies=bodies)
+        compared.refitted = compared.asked_of_typical = lambda labels: compared
+        return compared
 
     training = Taught()
     monkeypatch.setattr(diagnosis, "weighed", made_up)
@@ -179,7 +181,7 @@ def test_a_follow_up_begins_with_what_taught_the_answers_before_it(data, monkeyp
     rows = (MeasuredBody("bead", "mass", MASS, 0.01 * MASS),)
     follow_up = replace(data, conditions=data.fit if poured else (), bodies=rows)
     both = replace(data, conditions=(*data.fit, *follow_up.fit), bodies=rows)
-    assert diagnosis.pursued(training, both, Budget(), print, follow_up) == rows
+    assert diagnosis.pursued(training, both, Budget(), print, follow_up).bodies == rows
     assert training.looks == 2
     assert weighed_with[0] == (len(data.fit), None)
     assert weighed_with[-1] == (len(both.fit), rows)

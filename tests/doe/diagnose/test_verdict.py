@@ -1,5 +1,7 @@
 """The rules that turn probabilities into an answer."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from doe.diagnose.compared_features import MeasuredFeatures, weighed
 from doe.diagnose.emulator import Lessons, Way
 from doe.diagnose.posterior import FITS, Fit, Posterior
 from doe.diagnose.result import NO_EFFECT, UNEXPLAINED
-from doe.diagnose.verdict import DOUBTED, NOTHING_AT_ONCE, NOTHING_FROM, answer, verdict_of
+from doe.diagnose.verdict import DOUBTED, MOST_PAIRS, NOTHING_AT_ONCE, NOTHING_FROM, answer, read_in, verdict_of
 
 
 def posterior(nothing, outside, effects, badly=(), base=DOUBTED / 2.0, off=3.0):
@@ -106,6 +108,33 @@ def test_a_name_that_does_not_rest_on_a_parameter_far_off_stands_beside_a_model_
     """At T = 0.7, 0.02 becomes 0.02 exp(0.35 θ²): of 0.95 that leaves 0.9 up to θ = 1.95."""
     found = posterior(0.02, 0.01, {"a": 0.95, "b": 0.02}, base=0.9, off=off)
     assert answer(found, followed_up=False)[0] == ("effect:a" if named else f"ambiguous:a,{NO_EFFECT}")
+
+
+PAIRS = [f"{a}+{b}" for a in "abcdef" for b in "ghijkl"]
+
+
+@pytest.mark.parametrize("followed_up", [False, True])
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {"a": 0.4} | dict.fromkeys(PAIRS, 0.5 / len(PAIRS)),
+        {"a": 0.001, PAIRS[20]: 0.94} | dict.fromkeys(PAIRS[:20], 0.001),
+        {"a": 0.001} | dict.fromkeys(PAIRS, 0.0001),
+    ],
+)
+def test_an_answer_reads_no_fit_but_those_that_are_asked_of_typical_replicates(effects, followed_up):
+    nothing = 0.98 - sum(effects.values())
+    found = posterior(nothing, 0.02, effects)
+    asked = read_in(found)
+    assert {"base", "a"} <= set(asked)
+    assert len([label for label in asked if "+" in label]) >= MOST_PAIRS
+    only = replace(found, fits={label: found.fits[label] for label in asked})
+    assert answer(only, followed_up) == answer(found, followed_up)
+
+
+def test_a_sure_answer_asks_few_pairs():
+    found = posterior(0.001, 0.001, {"a": 0.99} | dict.fromkeys(PAIRS, 1e-5))
+    assert len(read_in(found)) == 2 + MOST_PAIRS
 
 
 def test_the_reason_is_told():
