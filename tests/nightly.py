@@ -52,6 +52,7 @@ PARTS = {
         )
     ),
     "installed from a wheel": Part((*SLOW, "tests/test_installed.py")),
+    "pages": Part((*SLOW, "tests/browser")),
     "page speed": Part((sys.executable, "-m", "tests.browser.page_speed")),
     "documents": Part((*SLOW, "tests/test_readme.py", "-k", "as_they_are_written")),
     "README, whole": Part((*SLOW, "tests/test_readme.py", "-k", "to_their_ends"), nightly=False),

@@ -239,6 +239,7 @@ server.stop()
     assert written == "0.000 s"
 
 
+@pytest.mark.slow
 def test_a_contact_law_is_a_choice_and_acts(site, tmp_path):
     law = "contact.law=soft_springs"
     assert pours(site, tmp_path, "funnel", law)["outcomes"]

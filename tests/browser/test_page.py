@@ -279,6 +279,7 @@ def test_a_pour_in_a_link_is_offered_in_words_and_poured_by_a_click_only(page, a
     page.keyboard.press("Space")
 
 
+@pytest.mark.slow
 def test_open_rooms_are_open_again_when_the_page_is_loaded_again(page, address):
     second = page.context.browser.new_page(viewport={"width": 1280, "height": 900})
     second.set_default_timeout(PATIENCE)

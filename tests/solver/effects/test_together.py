@@ -118,6 +118,7 @@ def landed(rule, *effects, restitution=0.5):
     return lab.state()[0, 9] / 0.5
 
 
+@pytest.mark.slow
 def test_adhesion_vanishes_for_contacts_that_share_their_stiffness():
     """A tenth of a percent: the state is looked at every 20 steps, and the pull goes with the root of w."""
     faint = EFFECTS["adhesion_jkr"](1e-9)

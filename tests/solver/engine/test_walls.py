@@ -70,6 +70,7 @@ def rolled(surface, steps=18_000):
     return np.array(path)
 
 
+@pytest.mark.slow
 def test_a_sphere_rolls_on_a_finely_meshed_plane_as_on_the_primitive():
     """Facets of 2 mm under a sphere of 5 mm: slipping, sticking and rolling over some thirty edges."""
     primitive, meshed = rolled(PLATE), rolled(as_mesh(sheet(0.08, 80)))

@@ -13,6 +13,7 @@ LEVEL = (3, 8, 11, 20, 39, 57, 2003, 2226)
 """Seeds of level cameras: funnels, dishes, discs, a lens, a plate with one end in view, a rim over the foot."""
 
 
+@pytest.mark.slow
 def test_a_few_pictures():
     found = summary([shot(seed).row for seed in LEVEL])
     assert found["wrong"] == 0

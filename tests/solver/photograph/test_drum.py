@@ -39,6 +39,7 @@ def test_a_drawn_bed_has_its_angle(name, angle):
     assert read.circle.radius == pytest.approx(look.radius, rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_errors_are_of_the_right_size():
     """Over beds of grains: as many angles beyond two standard errors as may be, and no shift."""
     reads = [read_drum(drawn(plane(30.0), replace(LOOKS["grains"], seed=seed, grains=30.0))) for seed in range(20)]

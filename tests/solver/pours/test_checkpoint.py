@@ -66,6 +66,7 @@ def test_a_change_of_stiffness_goes_on_where_it_was():
     same(drive(resumed(batch, 0, stiffer, kept)).record(), whole)
 
 
+@pytest.mark.slow
 def test_in_another_slot_among_other_pours():
     batch = Batch(capacity_for([HEAP], 1))
     whole = drive(Pour(batch, 0, HEAP, 5)).record()

@@ -41,6 +41,7 @@ def test_one_name_for_both(pool):
         assert isinstance(here, WorkerPool)
 
 
+@pytest.mark.slow
 def test_workers_killed_and_added_meanwhile_and_the_bits_are_those_of_this_process(taichi, cluster, pool):
     jobs = [Job(HEAP, seed, tag=seed) for seed in range(8)]
     queue, apart = deque(jobs[:6]), {}

@@ -177,6 +177,7 @@ def test_brought_back_before_it_nothing_was_disturbed():
     same(drive(pour, until=0.7).record(), plain)
 
 
+@pytest.mark.slow
 def test_a_pull_goes_along_into_a_batch_with_effects():
     pour = disturbed()
     expected = drive(pour, until=0.6).record()

@@ -26,6 +26,7 @@ BEADS = with_settings(
 )
 
 
+@pytest.mark.slow
 def test_a_lip_keeps_what_rolls_away_from_a_bare_plate():
     """Beads of 3 mm: over a lip of 4 mm a few jump, over one of 0.1 mm most roll."""
     bare = with_settings(BEADS, {"rig.lip_height": "0.1mm"})

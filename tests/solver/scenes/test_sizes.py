@@ -145,6 +145,7 @@ def test_three_components_are_mixed_by_mass(kind, spread):
     assert error.max() < 0.01
 
 
+@pytest.mark.slow
 def test_a_pour_of_three_components_leaves_the_declared_mixture(taichi):
     """The whole way: material file, counts, shuffled entry, pour, record; over three seeds."""
     scene = with_values(QUICK, {"rig.mass": "15g", "insertion.rate": "150g/s", "numerics.max_time": 0.6})
