@@ -9,7 +9,7 @@ asked of the replicates without outliers (``Compared.asked_of_typical``); all of
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ import numpy.typing as npt
 from doe.analysis.covariance import outlier_weights, scatter_between
 from doe.declared.bodies import BodyEvidence
 from doe.diagnose.emulator import Emulator, Lessons, Way, emulated
-from doe.diagnose.posterior import Data, Posterior, fitted, posterior
+from doe.diagnose.posterior import Data, Fit, Posterior, fitted, posterior
 from doe.errors import StatisticsError
 from doe.measurement.features import SCAN, feature_set, features_of_data, offer_of, sight_of
 from doe.measurement.measurement import Condition
@@ -118,18 +118,22 @@ class Compared:
         """
         if self.typical is self.data:
             return self
-        fits = dict(self.posterior.fits)
-        for label in labels:
-            fits[label] = replace(fits[label], p=fitted(self.emulator, self.typical, label).p)
-        return replace(self, posterior=replace(self.posterior, fits=fits))
+        found = self.posterior.fits
+        fits = {one: replace(found[one], p=fitted(self.emulator, self.typical, one).p) for one in labels}
+        return self._with(fits)
 
     def refitted(self, labels: Sequence[str]) -> Compared:
         """The same with the fits of ``labels`` by the plain emulator, their evidence as it was."""
-        fits = dict(self.posterior.fits)
+        fits = {}
         for label in labels:
-            found = fitted(self.plain, self.data, label)
-            fits[label] = replace(found, log_evidence=fits[label].log_evidence, p=fits[label].p)
-        return replace(self, posterior=replace(self.posterior, fits=fits))
+            before = self.posterior.fits[label]
+            plain = fitted(self.plain, self.data, label)
+            fits[label] = replace(plain, log_evidence=before.log_evidence, p=before.p)
+        return self._with(fits)
+
+    def _with(self, fits: Mapping[str, Fit]) -> Compared:
+        """The same with ``fits`` in the place of the former ones."""
+        return replace(self, posterior=replace(self.posterior, fits={**self.posterior.fits, **fits}))
 
 
 @dataclass(frozen=True)

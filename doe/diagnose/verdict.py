@@ -14,7 +14,7 @@ all that is still possible, which may be ``no_missing_effect`` and ``unexplained
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -113,7 +113,8 @@ def answer(found: Posterior, followed_up: bool) -> tuple[str, tuple[str, ...], s
     if found.outside >= max(found.nothing, p):
         text = f"Something is missing that no effect of the library explains (probability {_percent(found.outside)})."
         return UNEXPLAINED, (), text
-    everything, rivals = _everything(found), _credible(found)
+    everything = _everything(found)
+    rivals = _credible(everything)
     if sure >= THRESHOLD and not doubted and NO_EFFECT not in rivals:
         rivals.append(NO_EFFECT)
     names = tuple(one for one in rivals if one in found.effects)
@@ -127,17 +128,17 @@ def answer(found: Posterior, followed_up: bool) -> tuple[str, tuple[str, ...], s
 def read_in(found: Posterior) -> list[str]:
     """Models whose fits an answer or its table may name."""
     singles = [label for label in found.effects if "+" not in label]
-    pairs = [label for label in _credible(found) if "+" in label]
+    pairs = [label for label in _credible(_everything(found)) if "+" in label]
     return list(dict.fromkeys(["base", *singles, *pairs, *_likely_pairs(found)]))
 
 
 def _everything(found: Posterior) -> dict[str, float]:
+    """All answers with their probabilities."""
     return {**found.effects, NO_EFFECT: found.nothing, UNEXPLAINED: found.outside}
 
 
-def _credible(found: Posterior) -> list[str]:
+def _credible(everything: Mapping[str, float]) -> list[str]:
     """The smallest set of answers that holds ``CREDIBLE``, the most probable first."""
-    everything = _everything(found)
     order = sorted(everything, key=lambda one: -everything[one])
     return order[: int(np.searchsorted(np.cumsum([everything[one] for one in order]), CREDIBLE)) + 1]
 
