@@ -38,9 +38,7 @@ class Part:
 PARTS = {
     "solver": Part((*SLOW, "tests/solver", "--ignore=tests/solver/photograph")),
     "photographs": Part((*SLOW, "tests/solver/photograph")),
-    "exports and laboratory": Part(
-        (*SLOW, "tests/explorer/export/test_paraview.py", "tests/explorer/laboratory/test_round_trip.py")
-    ),
+    "exports and laboratory": Part((*SLOW, "tests/explorer/export/test_paraview.py", "tests/explorer/laboratory")),
     "validation campaign, small": Part((*SLOW, "tests/doe/validation")),
     "other engines, short": Part((*PYTEST, "-m", "slow or not slow", "tests/peers/test_short_pour.py")),
     "commands and plug-ins": Part(

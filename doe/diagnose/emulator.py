@@ -250,9 +250,11 @@ class Emulator:
     def at(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Means and variances of z, (n, D) each, for ``rows`` of the regression."""
         used = np.flatnonzero(np.any(rows != 0.0, axis=0))
-        some, covariance = rows[:, used], self.covariance[:, used][:, :, used]
-        variance = np.einsum("ni,dij,nj->nd", some, covariance, some, optimize=True)
-        return some @ self.mean[:, used].T, np.asarray(variance, dtype=np.float64)
+        first, second = np.triu_indices(len(used))
+        # Cᵢⱼ and Cⱼᵢ at once, in one product of matrices.
+        both = self.covariance[:, used[first], used[second]] * np.where(first == second, 1.0, 2.0)
+        some = rows[:, used]
+        return some @ self.mean[:, used].T, (some[:, first] * some[:, second]) @ both.T
 
     def scatter(self, rows: FloatArray) -> FloatArray:
         """Sum over z of the covariance (n, n) of the means for ``rows`` between sets of as many teaching pours."""

@@ -34,9 +34,9 @@ CUT_OFF = """(table, width) => {
 """What of a table does not fit a panel of that width [px]: the table itself, and words broken over two lines."""
 
 
-@pytest.fixture(scope="module")
-def project(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("project") / "seeds"
+@pytest.fixture
+def project(tmp_path):
+    folder = tmp_path / "project" / "seeds"
     new_project(folder, "sunflower_extract")
     return folder
 
@@ -66,7 +66,7 @@ def shot(page, name):
         page.screenshot(path=f"{folder}/{name}.png")
 
 
-def test_a_photograph_is_read_and_made_the_target(browser, project):
+def test_a_photograph_is_made_the_target_until_it_is_removed(browser, project):
     with opened(browser, project) as page:
         room(page, "Laboratory")
         unfold(page, "Photograph → angle of repose")
@@ -98,8 +98,7 @@ def test_a_photograph_is_read_and_made_the_target(browser, project):
         shot(page, "calibrate")
     assert (project / "target" / "photograph.json").is_file()
 
-
-def test_it_is_there_after_a_restart_until_it_is_removed(browser, project):
+    # The server is started again.
     with opened(browser, project) as page:
         page.locator("#state-line").get_by_text("· photograph").wait_for()
         room(page, "Laboratory")

@@ -50,6 +50,7 @@ def test_a_refusal_is_its_last_line():
         python("raise SystemExit(9)")
 
 
+@pytest.mark.slow
 def test_a_rig_answers_what_the_command_line_prints(tmp_path):
     """The fastest of the three, on the solver itself."""
     settings = {"rig.drop_height": 0.1, "rig.specimen": "sphere"}

@@ -55,10 +55,11 @@ def onward(batch, steps):
     return batch.advance(np.array([steps], dtype=np.int32))[0]
 
 
-def test_a_sleeping_pile_does_not_wake_from_its_own_weight(heap, pile):
+@pytest.mark.parametrize("steps", [10_000, pytest.param(50_000, marks=pytest.mark.slow)])
+def test_a_sleeping_pile_does_not_wake_from_its_own_weight(steps, heap, pile):
     _, _, before = heap
     begin = onward(pile, 1)
-    end = onward(pile, 50_000)
+    end = onward(pile, steps)
     assert end[ASLEEP] == begin[ASLEEP] == len(before)
     assert end[REBUILDS] == begin[REBUILDS]
     assert np.array_equal(pile.bodies(0, len(before)), before)

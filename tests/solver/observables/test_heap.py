@@ -48,6 +48,7 @@ def test_two_layers_of_beans_are_no_heap_whatever_angle_they_are_read_at(layer):
     assert read_off(packed(layer), observables_of)["angle_of_repose_deg"] > 20.0
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("taichi")
 def test_beans_that_stay_piled_up_are_a_heap():
     record = run_pour(heap(), 3)

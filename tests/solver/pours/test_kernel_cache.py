@@ -61,6 +61,7 @@ def kernels(folder):
     return {file.name: file.stat().st_mtime_ns for file in folder.glob("*.tic")}
 
 
+@pytest.mark.slow
 def test_what_a_killed_process_compiled_is_kept(folder):
     command = [sys.executable, "-c", FIRST_LAUNCH]
     assert subprocess.run([*command, "killed"], check=False).returncode == -signal.SIGKILL

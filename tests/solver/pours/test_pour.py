@@ -92,6 +92,7 @@ def test_insertion_never_overlaps():
     assert pour.entered > 4
 
 
+@pytest.mark.slow
 def test_an_arch_of_bodies_that_are_narrower_than_the_outlet_is_a_jam():
     rough = {"pair.grain.grain.static_friction": 0.9, "pair.grain.steel.static_friction": 0.9}
     scene = with_values(BEANS, rough | {"rig.mass": 180 * BEAN.mass, "insertion.rate": 0.1})
