@@ -25,6 +25,7 @@ line that each part printed. `python -m tests.nightly --only PART` runs one of t
 NOT_NIGHTLY = " (by hand)"
 PYTEST = (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider")
 SLOW = (*PYTEST, "-m", "slow")
+BOTH_CORES = (*SLOW, "-n", "2", "--dist")
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,8 @@ class Part:
 
 
 PARTS = {
-    "solver": Part((*SLOW, "tests/solver", "--ignore=tests/solver/photograph")),
-    "photographs": Part((*SLOW, "tests/solver/photograph")),
+    "solver": Part((*BOTH_CORES, "loadfile", "tests/solver", "--ignore=tests/solver/photograph")),
+    "photographs": Part((*BOTH_CORES, "load", "tests/solver/photograph")),
     "exports and laboratory": Part((*SLOW, "tests/explorer/export/test_paraview.py", "tests/explorer/laboratory")),
     "validation campaign, small": Part((*SLOW, "tests/doe/validation")),
     "other engines, short": Part((*PYTEST, "-m", "slow or not slow", "tests/peers/test_short_pour.py")),

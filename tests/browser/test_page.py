@@ -294,6 +294,7 @@ def test_open_rooms_are_open_again_when_the_page_is_loaded_again(page, address):
     second.close()
 
 
+@pytest.mark.slow
 def test_a_room_that_is_opened_while_the_page_loads_is_not_closed_by_those_of_the_page_before(page, address):
     second = page.context.browser.new_page(viewport={"width": 1280, "height": 900})
     second.set_default_timeout(PATIENCE)

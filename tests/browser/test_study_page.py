@@ -190,6 +190,7 @@ def test_a_study_is_started_paused_cancelled_and_resumed(page, address, data):
     cancel_resume_cancel(page)
 
 
+@pytest.mark.slow
 def test_a_diagnosis_is_started_watched_cancelled_and_resumed(page, address, data):
     """On the measured data that are chosen at first, up to the first pours of the base model."""
     opened(page, address, "Diagnose")
