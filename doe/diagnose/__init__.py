@@ -1,4 +1,4 @@
 """Diagnosis: from measured summaries and simulated runs to what the model lacks, if anything (README.md).
 
-`diagnosis.py` is the whole loop with its pours, `posterior.py` the judgement on pours that are there.
+`diagnosis.py` runs the whole loop with its pours; `posterior.py` weighs the models by the pours already made.
 """

@@ -1,9 +1,9 @@
-"""What to measure next: the feasible changes of the rig, each poured with every answer that is left.
+"""Candidates for the next measurement: feasible changes of the rig, each poured with every remaining answer.
 
-The pours are those that teach the models (``training_pours.py``), made in the changed rig, so that data sets of one
-declared model share them, and those of the chosen set-up serve again when its data are weighed. In each set-up a
-regression of its own says what every answer predicts at its best fit, in all features that the data offer; what fit,
-regression and the axis of a scan leave open is in the covariance.
+The points of the training pours (``training_pours.py``) are poured in the changed rig, so data sets of one declared
+model share these pours, and those of the chosen set-up serve again when its data are weighed. In each set-up a separate
+regression predicts every answer at its best fit, in all features that the data offer. The covariance includes the
+uncertainty of the fit, of the regression and of the axis of a scan.
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ FloatArray = npt.NDArray[np.float64]
 PoursIn = Callable[[Sequence[Condition]], ModelPours]
 
 BASE_POURS, POURS, TAUGHT = 12, 4, 14
-"""Pours of the base model, and of every direction of an effect that is left, in each set-up of the candidates; and of a
+"""Pours of the base model, and of every direction of a remaining effect, in each candidate set-up; and pours of a
 direction when the data of the chosen one are weighed (six, and a look of eight, at least)."""
 MISTAKEN = 0.01
-"""Probability from which on an answer counts among those that the one given may be mistaken for."""
+"""Probability from which an answer counts among those that the given answer may be mistaken for."""
 INTERVAL = 2.0 * 1.96
-"""Standard deviations in a 95 % interval."""
+"""Width of a 95 % interval [standard deviations]."""
 
 
 @dataclass(frozen=True)
 class CandidateExperiments:
-    """Set-ups in order, and how many pours had to be run for them."""
+    """Ranked set-ups, and how many pours had to be run for them."""
 
     suggestions: tuple[Suggestion, ...]
     run_now: int
@@ -64,20 +64,20 @@ def next_experiment(
     pours_in: PoursIn,
     bodies: BodyEvidence | None = None,
 ) -> CandidateExperiments:
-    """The candidates for telling answers apart, the most discriminating set-up first.
+    """Rank the candidates for telling answers apart, the most discriminating set-up first.
 
     Parameters
     ----------
     training, found
-        What taught the models, and the posterior that leaves them.
+        The training pours, and the posterior that follows from them.
     weights
-        Probability of every answer that is left, "base" for nothing missing; no candidates with fewer than two.
+        Probability of every remaining answer, "base" for nothing missing; with fewer than two there are no candidates.
     condition
         The fitted condition that is changed.
     pours_in
-        The pours of the declared model in set-ups.
+        Gives the pours of the declared model in set-ups.
     bodies
-        What is to be measured of single bodies beside any of them, with the standard errors that are expected.
+        Single-body measurements to be made with any of the set-ups, with their expected standard errors.
     """
     if len(weights) < 2:
         return CandidateExperiments((), 0)
@@ -85,14 +85,14 @@ def next_experiment(
     turned = any(name in directed for label in weights for name in label.split("+"))
     changes = {change.named(turned): values for change, values in feasible(condition.scene, training.calibrated)}
     set_ups = [changed(condition, name, values, turned) for name, values in changes.items()]
-    # What is measured there is weighed by all effects.
+    # Data from a set-up are weighed by all effects, so all must be possible in it.
     set_ups = [one for one in set_ups if training.possible_in(one.scene)]
     asked = dict.fromkeys(name for label in weights if label != "base" for name in label.split("+"))
     levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in asked)
     asked_of = () if bodies is None else bodies.asked
     ranked: tuple[RankedExperiment, ...] = ()
     planned = run_now = 0
-    # Where bodies tell all, no other set-up can gain.
+    # If single bodies tell all answers apart, no other set-up can do better.
     for some in (set_ups,) if bodies is None else (set_ups[:1], set_ups):
         items, more = _items(training, found, weights, some, pours_in)
         run_now += more
@@ -112,7 +112,7 @@ def next_experiment(
 def checked_by_bodies(
     verdict: Verdict, found: Posterior, declared: Declared, measurement: Measurement
 ) -> tuple[Suggestion, ...]:
-    """What of single bodies tells an answer that is given from what it may be mistaken for; nothing if it is none."""
+    """Single-body measurements that tell a given answer from those it may be mistaken for; empty if there are none."""
     if verdict.kind == UNEXPLAINED:
         return ()
     (answer,) = verdict.names or (BASE,)
@@ -123,7 +123,7 @@ def checked_by_bodies(
     if (bodies := wanted_bodies(measurement, declared, list(acts.values()))) is None:
         return ()
     predictions = {label: Prediction(*bodies.predicted(acts[label])) for label in weights}
-    # All noise is in the predictions.
+    # Nothing is poured: all noise is in the predictions.
     (ranked,) = rank_experiments([CandidateExperiment(BODIES_ALONE, predictions)], weights, math.inf)
     return (Suggestion(ranked, {}, measurement.fit[0].name, tuple(weights), (), 0, bodies=bodies.asked),)
 
@@ -135,10 +135,10 @@ def _items(
     set_ups: Sequence[Condition],
     pours_in: PoursIn,
 ) -> tuple[list[CandidateExperiment], int]:
-    """What every answer predicts in each of ``set_ups``, and how many pours had to be run for it."""
+    """Predictions of every answer in each of ``set_ups``, and how many pours had to be run for them."""
     model = pours_in(set_ups)
     probes = training.base(BASE_POURS) + training.probes(found, tuple(weights), POURS)
-    # All set-ups at once, so that no core waits for the last pour of one of them; what is only looked at after that.
+    # Run all set-ups together, so that no core idles at the end of one; views of these pours follow.
     plain = dict.fromkeys(probe.point.seen(AS_IT_IS) for probe in probes)
     model.run("what to measure next", list(plain))
     rows = model.run("what to measure next", [probe.point for probe in probes])
@@ -159,7 +159,7 @@ def _item(
     c: int,
     set_up: Condition,
 ) -> CandidateExperiment:
-    """What every answer predicts in a set-up, by a regression of its own; StatisticsError if too few pours ended."""
+    """Predictions of every answer in a set-up, by a separate regression; StatisticsError if too few pours ended."""
     offered = feature_set(set_up).offered(offer_of(set_up))
     taught, (columns,) = usable(lessons, [np.arange(offered)])
     used = sorted(set(taught.way[taught.way >= 0].tolist()))
@@ -167,7 +167,7 @@ def _item(
         raise StatisticsError(f"{training.ways[missing.pop()].name}: none of its pours is valid")
     taught = replace(taught, way=np.array([used.index(way) if way >= 0 else -1 for way in taught.way]))
     emulator = emulated(taught, [training.ways[way] for way in used])
-    # The axis of a scan is off in the new pours as well.
+    # Scans of the new pours have an axis error as well.
     shared = np.zeros((len(columns), 0))
     axis_error = max((one.axis_error for one in set_up.surfaces.values()), default=0.0)
     if axis_error > 0.0:
@@ -176,8 +176,8 @@ def _item(
     rows = [_rows(emulator, training, found, label) for label in weights]
     best, theta = np.array([some[0] for some in rows]), np.array([found.fits[label].theta for label in weights])
     _, loose, slopes = emulator.moved(theta)
-    # How well a regression of few pours knows an answer is no property of it that would give it away, nor does it stay;
-    # and what its noise sets between two answers tells nothing apart.
+    # The error of a regression on few pours is no property of an answer and does not last, so all answers get the same;
+    # and differences between answers that its noise explains are removed, because they tell nothing apart.
     unsure = np.diag((emulator.at(best)[1] + loose).mean(axis=0)) * POURS / TAUGHT
     placed = emulator.placed(best, theta)
     means = shrunk_means(emulator.at(placed)[0], emulator.scatter(placed), np.array(list(weights.values())))
@@ -190,12 +190,12 @@ def _item(
 
 
 def acting_in(found: Posterior, label: str) -> Acting:
-    """What acts in the best fit of ``label``."""
+    """Effects that act in the best fit of ``label``: name, amplitude and its standard deviation."""
     return [(a.effect, a.value, (a.high - a.low) / INTERVAL) for a in found.fits[label].amplitudes]
 
 
 def _with_bodies(item: CandidateExperiment, found: Posterior, bodies: BodyEvidence) -> CandidateExperiment:
-    """``item`` with the numbers of single bodies among what is predicted; a pour's noise on top is a little much."""
+    """``item`` with predictions of the single-body numbers; adding a pour's noise to them is slightly too much."""
     predictions = {}
     for label, one in item.predictions.items():
         mean, covariance = bodies.predicted(acting_in(found, label))
@@ -204,7 +204,7 @@ def _with_bodies(item: CandidateExperiment, found: Posterior, bodies: BodyEviden
 
 
 def _rows(emulator: Emulator, training: TrainingPours, found: Posterior, label: str) -> FloatArray:
-    """Rows of the regression: at the best fit of ``label``, and with each amplitude a standard deviation beside it."""
+    """Rows of the regression at the best fit of ``label``, and with each amplitude moved by one standard deviation."""
     base, here = emulator.row(), emulator.row()
     beside = []
     number = {way.name: k for k, way in enumerate(emulator.ways)}
@@ -234,5 +234,5 @@ def _rows(emulator: Emulator, training: TrainingPours, found: Posterior, label: 
 
 
 def as_suggested(condition: Condition, asked: Suggestion) -> Condition:
-    """``condition`` with the change of a suggestion, under its name."""
+    """``condition`` with the change that ``asked`` suggests, under the name of its experiment."""
     return changed(condition, asked.experiment.name, asked.values, asked.turned)

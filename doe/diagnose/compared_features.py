@@ -1,9 +1,9 @@
 """Which features are compared, and what the data are in them.
 
-A feature is compared where the data offer it in at least two replicates and half of them (in the one that there is),
-where ``READABLE`` of the base model's pours give it, and where it varies at all in the pours. What the data offer is a
-matter of names (``doe/measurement/features.py``), so nothing here looks at a value and chooses. Whether a model fits is
-asked of the replicates without outliers (``Compared.asked_of_typical``); all of them weigh one model against another.
+A feature is compared if at least two replicates and half of them offer it (or the only one does), if ``READABLE`` of
+the base model's pours give it, and if it varies at all in the pours. What the data offer depends on names
+(``doe/measurement/features.py``), so no value influences the choice. Whether a model fits is judged by the replicates
+without outliers (``Compared.asked_of_typical``); all replicates weigh one model against another.
 """
 
 from __future__ import annotations
@@ -28,20 +28,19 @@ from doe.measurement.summaries import summary_uncertainties
 FloatArray = npt.NDArray[np.float64]
 
 READABLE = 0.8
-"""Share of the base model's pours in which a feature has to be there."""
+"""Fraction of the base model's pours in which a feature must be readable."""
 BIAS_ERROR = 0.3
-"""Standard deviation of a sight's bias, as a share of it: it is that of the base model's piles, and cameras are not
-what is assumed of them."""
+"""Relative standard deviation of a sight's bias, which is computed for the base model's piles and an assumed camera."""
 CONSTANT = 1e-9
-"""Scatter within groups of pours, as a share of the feature's size, below which it says nothing."""
+"""Scatter within groups of pours, relative to the feature's size, below which a feature carries no information."""
 
 
 @dataclass(frozen=True)
 class MeasuredFeatures:
-    """Features that a condition's data offer: names, replicates (r, d) and the stated error of each, (d,).
+    """Features that a condition's data offer: names, replicates (r, d) and the stated error of each feature, (d,).
 
-    ``scalars``: how many of them are not read off a surface. ``sight``: what the scans were seen through;
-    ``axis_error``: of their axis [m].
+    ``scalars``: number of features that are not read off a surface. ``sight``: what the scans were seen through;
+    ``axis_error``: error of their axis [m].
     """
 
     condition: str
@@ -55,13 +54,13 @@ class MeasuredFeatures:
     sight: Sight = PERFECT
 
     def pours(self, columns: npt.NDArray[np.int64]) -> FloatArray:
-        """The replicates in which all of ``columns`` could be read."""
+        """Replicates in which all of ``columns`` could be read."""
         block = self.values[:, columns]
         return np.asarray(block[np.isfinite(block).all(axis=1)], dtype=np.float64)
 
 
 def measured(condition: Condition, offer: str | None = None) -> MeasuredFeatures:
-    """What ``condition`` offers, or the part of it that data of the kind ``offer`` would have."""
+    """Features that ``condition`` offers, or the subset that data of the kind ``offer`` would contain."""
     names, values = feature_set(condition), features_of_data(condition)
     most = names.offered(offer_of(condition)) if offer is None else min(names.offered(offer), values.shape[1])
     stated = np.zeros(most)
@@ -87,18 +86,18 @@ class Compared:
     Attributes
     ----------
     conditions, names
-        Of the conditions, and by condition of the features.
+        Names of the conditions, and of the features by condition.
     left_out
-        "condition: feature" of what the data offer and no pour varies or gives.
+        "condition: feature" for each feature that the data offer and no pour varies or gives.
     data, emulator, posterior
-        What is weighed, by what, and what came out.
+        The data, the emulator that they are weighed by, and the result.
     typical
-        The data of the replicates without outliers; ``data`` itself where there are none.
+        The data of the replicates without outliers; ``data`` itself if there are none.
     blocks
         Measured replicates, by condition (r, d_c).
     plain
-        The emulator without what the signatures have in common, in the same coordinates: for the amplitude of what is
-        named.
+        The emulator without what the signatures have in common (``shrunk=False``), in the same coordinates: for the
+        amplitude of the named effect.
     """
 
     conditions: tuple[str, ...]
@@ -112,9 +111,9 @@ class Compared:
     plain: Emulator
 
     def asked_of_typical(self, labels: Sequence[str]) -> Compared:
-        """The same with the p of ``labels`` by the replicates without outliers.
+        """Return the same with the p of ``labels`` from the replicates without outliers.
 
-        A pile that came down in a lump may tell one effect from another, but a model is of what piles are on average.
+        A pile that came down in a lump may tell one effect from another, but a model describes piles on average.
         """
         if self.typical is self.data:
             return self
@@ -123,7 +122,7 @@ class Compared:
         return self._with(fits)
 
     def refitted(self, labels: Sequence[str]) -> Compared:
-        """The same with the fits of ``labels`` by the plain emulator, their evidence as it was."""
+        """Return the same with ``labels`` refitted by the plain emulator; their evidence and p stay as they were."""
         fits = {}
         for label in labels:
             before = self.posterior.fits[label]
@@ -132,15 +131,15 @@ class Compared:
         return self._with(fits)
 
     def _with(self, fits: Mapping[str, Fit]) -> Compared:
-        """The same with ``fits`` in the place of the former ones."""
+        """Return the same with ``fits`` in place of the former ones."""
         return replace(self, posterior=replace(self.posterior, fits={**self.posterior.fits, **fits}))
 
 
 @dataclass(frozen=True)
 class Instrument:
-    """What the scanner of a condition does to all features of the base model's pours, by the same pours seen both ways.
+    """Shift of all features of the base model's pours by a condition's scanner, from two views of the same pours.
 
-    ``bias``: its sight, (d,). ``axis``: its axis being off by one standard deviation along x and along y, (2, d).
+    ``bias``: by its sight, (d,). ``axis``: by an axis error of one standard deviation along x and along y, (2, d).
     """
 
     bias: FloatArray
@@ -154,10 +153,11 @@ def weighed(
     instruments: Sequence[Instrument] = (),
     bodies: BodyEvidence | None = None,
 ) -> Compared:
-    """Weigh all models by the data of fitted ``conditions``, the first that were poured, freed from the bias of their
-    ``instruments``, and by what was measured of single bodies.
+    """Weigh all models by the data of the fitted ``conditions`` and by the measurements of single bodies.
 
-    Raises StatisticsError where a condition has nothing that can be compared.
+    ``conditions`` are the first that were poured; the bias of their ``instruments`` is subtracted from the data.
+
+    Raises StatisticsError if a condition has nothing that can be compared.
     """
     if instruments:
         conditions = [
@@ -201,7 +201,7 @@ def weighed(
 
 
 def usable(lessons: Lessons, offered: Sequence[npt.NDArray[np.int64]]) -> tuple[Lessons, list[npt.NDArray[np.int64]]]:
-    """The complete pours with those of the ``offered`` features that they give and that vary, and which these are."""
+    """Return the complete pours with those ``offered`` features that they give and that vary, and these columns."""
     columns = [some[_readable(lessons, c)[some]] for c, some in enumerate(offered)]
     taught = _complete(lessons.only(columns))
     columns = [chosen[_varies(taught, c)] for c, chosen in enumerate(columns)]
@@ -209,26 +209,26 @@ def usable(lessons: Lessons, offered: Sequence[npt.NDArray[np.int64]]) -> tuple[
 
 
 def _there(condition: MeasuredFeatures) -> npt.NDArray[np.int64]:
-    """Features that the data of a condition give."""
+    """Indices of the features that a condition's data give."""
     number = len(condition.values)
     return np.flatnonzero(np.isfinite(condition.values).sum(axis=0) >= max(min(2, number), number / 2))
 
 
 def _readable(lessons: Lessons, c: int) -> npt.NDArray[np.bool_]:
-    """Which features the base model's pours give."""
+    """Mask of the features that the base model's pours give."""
     base = lessons.blocks[c][lessons.way == -1]
-    # A pour that broke off says nothing of a feature.
+    # A pour that broke off says nothing about any feature.
     ended = np.isfinite(base).any(axis=1)
     return np.asarray(np.isfinite(base[ended]).mean(axis=0) >= READABLE)
 
 
 def _complete(lessons: Lessons) -> Lessons:
-    """Pours of which every condition came to a valid end and could be read."""
+    """Pours that came to a valid end and could be read in every condition."""
     return lessons.where(np.all([np.isfinite(block).all(axis=1) for block in lessons.blocks], axis=0))
 
 
 def _varies(lessons: Lessons, c: int) -> npt.NDArray[np.bool_]:
-    """Which features of a condition vary within any group of pours that teach the scatter."""
+    """Mask of the features of a condition that vary within any group of the pours that count for the covariance."""
     own = lessons.where(lessons.own)
     block, groups = own.blocks[c], own.groups()
     size = np.abs(block).max(axis=0, initial=0.0)
@@ -246,10 +246,10 @@ def _loadings(
     columns: Sequence[npt.NDArray[np.int64]],
     instruments: Sequence[Instrument],
 ) -> FloatArray:
-    """I: what the errors of instruments, which no averaging reduces, do to z, (D, q).
+    """I: response of z to the errors of instruments, which averaging does not reduce, (D, q).
 
-    Stated errors of numbers are independent. What a scan's axis is off, and what is not known of the bias of its sight,
-    move all that is read off the surface together.
+    Stated errors of numbers are independent. The error of a scan's axis, and that of the bias of its sight, move all
+    features read off the surface together.
     """
     size, first, found = len(emulator.whitening), 0, []
     for c, (squash, block, one, chosen) in enumerate(zip(emulator.squashes, blocks, conditions, columns, strict=True)):

@@ -1,9 +1,9 @@
 """Confirmation by fresh pours: both models at their best fits, in the fitted and in the held-out conditions.
 
-The seeds are those of no pour that taught a model. Held-out data never choose: they report the error, and they may take
-an answer back (``doe/holdout.py``).
+The seeds are those of no training pour. Held-out data never choose an answer: they report the error, and they may
+withdraw an answer (``doe/holdout.py``).
 
-Of scanned piles the same pours show where on the plate the residual sits. Nothing is decided by that.
+For scanned piles the same pours show where on the plate the residual is. No decision depends on that.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 def model_of(fit: Fit, declared: Declared) -> CalibratedModel:
-    """The model of a fit, with parameters and amplitudes within their ranges."""
+    """Calibrated model of ``fit``, with parameters and amplitudes limited to their ranges."""
     amplitudes: dict[str, tuple[float, ...]] = {}
     ranges = {effect.name: effect for effect in declared.effects}
     for one in fit.amplitudes:
@@ -42,8 +42,8 @@ def model_of(fit: Fit, declared: Declared) -> CalibratedModel:
 class Confirmed:
     """Summaries of the fresh pours of one model, per condition (n, d_c).
 
-    broken: pours left out because they broke off or left nothing to be read.
-    profiles: the height profiles of the same pours, per condition (n, k_c) [m]; k_c = 0 without measured ones.
+    broken: number of pours left out because they broke off or could not be read.
+    profiles: height profiles of the same pours, per condition (n, k_c) [m]; k_c = 0 if none were measured.
     """
 
     model: CalibratedModel
@@ -60,18 +60,18 @@ def confirm(
     where: Sequence[int] | None = None,
     sequence: str = "confirm",
 ) -> tuple[Confirmed, ...]:
-    """Pour each model ``number`` times in every condition of ``pours``, or ``where``; ``widths``: summaries of each.
+    """Pour each model ``number`` times in every condition of ``pours``, or only in ``where``.
 
-    Pours of another ``sequence`` have other seeds.
+    ``widths``: number of summaries in each condition. Another ``sequence`` has other seeds.
     """
     points = [point for model in models for point in confirming(model, number, sequence)]
-    # All of them at once, so that no worker waits for the last pour of a model.
+    # Run all together, so that no worker idles at the end of one model.
     rows = iter(pours.run(f"{sequence}: {', '.join(model.name for model in models)}", points, where))
     return tuple(_confirmed(model, [next(rows) for _ in range(number)], widths) for model in models)
 
 
 def confirming(model: CalibratedModel, number: int, sequence: str = "confirm") -> list[Point]:
-    """The points of the ``number`` pours that confirm a model."""
+    """Points of the ``number`` pours that confirm ``model``."""
     return [Point(f"{sequence} {number}", k, model.theta, model.effects) for k in range(number)]
 
 
@@ -88,9 +88,9 @@ def _confirmed(model: CalibratedModel, rows: Sequence[Sequence[PointPour]], widt
 def residual_maps(
     conditions: Sequence[Condition], before: Confirmed, after: Confirmed, pours: ModelPours, number: int
 ) -> tuple[ResidualMap, ...]:
-    """Of those of ``conditions``, those of ``pours``, that have scans of two piles at least.
+    """Residual maps of those ``conditions`` that have scans of at least two piles.
 
-    ``number``: pours of each model that were asked for.
+    ``conditions`` are those of ``pours``. ``number``: pours of each model that were asked for.
     """
     found = []
     for c, condition in enumerate(conditions):

@@ -1,4 +1,4 @@
-"""The whole loop: pour what teaches the models, weigh them by the data, confirm by fresh pours, say what comes next."""
+"""The whole loop: make training pours, weigh the models by the data, confirm by fresh pours, suggest the next step."""
 
 from __future__ import annotations
 
@@ -33,52 +33,52 @@ from doe.store import Store
 
 FloatArray = npt.NDArray[np.float64]
 PoursAt = Callable[[Sequence[Condition], int | None], ModelPours]
-"""Pours of the declared model in conditions, of a place in the data where they may be added to it."""
+"""Returns the pours of the declared model in conditions; second argument: place in the data where they may be added."""
 
 FRESH = 8
-"""Pours per model and condition in the confirmation, or as many as there are replicates if that is more."""
+"""Pours per model and condition in the confirmation, or the number of replicates if that is larger."""
 SETTLED, QUIET = 0.95, 0.8
-"""Probability of an effect that has had a closer look, and of nothing, from which on no further look is taken; where
-the most probable effect has had one, ``NOTHING_FROM`` of nothing will do, for more pours add nothing to the data."""
+"""Probabilities of an effect that has had a closer look, and of nothing missing, from which no further look is taken.
+If the most probable effect has had one, ``NOTHING_FROM`` of nothing suffices: more pours add nothing to the data."""
 HELD = 2
-"""Closer looks in a row that leave an effect at ``THRESHOLD`` or more after which no further one is taken."""
+"""Successive closer looks that leave an effect at ``THRESHOLD`` or more after which no further one is taken."""
 LITTLE = 0.1
-"""Rise of a log evidence that changes nothing: by a tenth of the odds, before ``TEMPERATURE``."""
+"""Negligible rise of a log evidence: it changes the odds by a tenth, before ``TEMPERATURE``."""
 FIRST_OTHER_ROOT = 100
-"""Roots of other seeds begin here: below it are those of laboratories and of reference pours."""
+"""First root of other seeds; those below belong to laboratories and reference pours."""
 MOST_RIVALS = 4
-"""That the next experiment is chosen for."""
+"""Largest number of answers for which the next experiment is chosen."""
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What came out. ``fit_error`` and ``holdout_error`` are by fresh pours; the latter is empty without a holdout."""
+    """The result. ``fit_error`` and ``holdout_error`` are from fresh pours; the latter is empty without a holdout."""
 
     declared: Declared
     conditions: tuple[Condition, ...]
-    """Of the data and of a follow-up, in the order of the blocks below."""
+    """Conditions of the data and of a follow-up, in the order of the blocks below."""
     levels: tuple[Level, ...]
     offered: tuple[Offered, ...]
     verdict: Verdict
     before: Confirmed
     after: Confirmed
-    """The same as ``before`` where no effect is named."""
+    """The same as ``before`` if no effect is named."""
     fit_error: tuple[HoldoutError, ...]
     holdout_error: tuple[HoldoutError, ...]
     held_out: HeldOut | None
-    """What the held-out data say of the final model; None without such data."""
+    """What the held-out data say about the final model; None without such data."""
     maps: tuple[ResidualMap, ...]
-    """Where in the scanned piles the residual sits, before and after."""
+    """Where in the scanned piles the residual is, before and after."""
     suggestions: tuple[Suggestion, ...]
     pours: int
-    """Pours that were really run; the others were found in the store."""
+    """Number of pours that were really run; the others were found in the store."""
     settings: int
     bodies: tuple[MeasuredBody, ...] = ()
 
 
 @dataclass(frozen=True)
 class Conclusion:
-    """Fresh pours of the calibrated base model and the final one, and what held-out data say of the latter."""
+    """Fresh pours of the calibrated base model and the final one, and what held-out data say about the latter."""
 
     before: Confirmed
     after: Confirmed
@@ -99,8 +99,8 @@ def run_diagnosis(
 ) -> Diagnosis:
     """Diagnose ``measurement`` against its declared model, with ``effects`` as candidates.
 
-    Data sets of one model share their pours; those of another ``seed`` are others. The conditions of
-    a ``follow_up`` are fitted as well. ``plan_next``: whether to look for what could be measured next.
+    Data sets of one model share their pours; another ``seed`` gives other pours. The conditions of a ``follow_up`` are
+    fitted as well. ``plan_next``: whether to look for what could be measured next.
     """
     declared, paths = declare(measurement, effects), [p.path for p in measurement.parameters]
     if follow_up is not None:
@@ -142,9 +142,9 @@ def run_diagnosis(
 
 
 def joined(measurement: Measurement, follow_up: Measurement) -> Measurement:
-    """The data with the fitted conditions and the single bodies of a follow-up.
+    """Return ``measurement`` with the fitted conditions and the single bodies of ``follow_up``.
 
-    Raises MeasurementError where the follow-up has other parameters, or a condition of a name that is there already.
+    Raises MeasurementError if the follow-up has other parameters, or a condition whose name is already used.
     """
     if follow_up.conditions and follow_up.parameters != measurement.parameters:
         raise MeasurementError(f"{follow_up.folder}: its [parameters] differ from those of {measurement.folder}")
@@ -161,12 +161,12 @@ def joined(measurement: Measurement, follow_up: Measurement) -> Measurement:
 def pursued(
     training: TrainingPours, measurement: Measurement, budget: Budget, say: Say, follow_up: Measurement | None
 ) -> Compared:
-    """Models and data once what is in question has been looked at more closely; ``follow_up``: what is in the data."""
+    """Models and data after closer looks at what is in question; ``measurement`` already contains ``follow_up``."""
     data = [measured(condition) for condition in measurement.fit]
     instruments, looked = training.instruments(data), set[str]()
     parts = [(len(data), measurement)]
     if follow_up is not None:
-        # What a follow-up settles needs no look, and yet what taught the answers before it has to teach it.
+        # Data that settle the question need no look, but the looks before a follow-up are made in its set-up too.
         known = replace(measurement, bodies=measurement.bodies[: len(measurement.bodies) - len(follow_up.bodies)])
         parts.insert(0, (len(data) - len(follow_up.fit), known))
     for number, part in parts:
@@ -185,7 +185,7 @@ def pursued(
 def _settled(
     training: TrainingPours, weigh: Callable[[Lessons], Compared], budget: Budget, say: Say, looked: set[str]
 ) -> Compared:
-    """Models and data after closer looks, of which those at the effects ``looked`` have been taken."""
+    """Models and data after closer looks. ``looked``: effects that have had one; new ones are added."""
     compared = weigh(training.lessons())
     say(f"after screening: {odds(compared.posterior)}")
     held, before = 0, ""
@@ -212,9 +212,9 @@ def _settled(
 
 
 def inseparable(compared: Compared, name: str) -> str:
-    """An answer that no number of pours tells from the effect ``name`` and that keeps it from a name; "" for none.
+    """An answer that no number of pours tells from the effect ``name`` and that keeps it from being named; "" for none.
 
-    A name takes ``THRESHOLD``, which it cannot get while another answer without it holds the rest by itself.
+    A name needs ``THRESHOLD``, which it cannot reach while another answer without it alone holds more than the rest.
     """
     found = compared.posterior
     everything = {**found.effects, "base": found.nothing}
@@ -233,7 +233,7 @@ def concluded(
     pours: ModelPours,
     say: Say,
 ) -> tuple[Conclusion, Verdict]:
-    """The final model beside the base model in ``conditions``, those of ``pours``, and the verdict that it leaves."""
+    """Fresh pours of the final and the base model in ``conditions``, those of ``pours``, and the verdict after them."""
     fits = compared.posterior.fits
     asked = [model_of(fits[label], declared) for label in dict.fromkeys(("base", verdict.final))]
     confirmed = confirm(
@@ -251,12 +251,12 @@ def concluded(
 
 
 def fresh_pours(conditions: Sequence[Condition]) -> int:
-    """Pours per model and condition in the confirmation."""
+    """Number of pours per model and condition in the confirmation."""
     return max([FRESH, *(condition.replicates for condition in conditions)])
 
 
 def odds(found: Posterior) -> str:
-    """The most probable answers, in words."""
+    """The most probable answers as text."""
     everything = {**found.effects, "nothing missing": found.nothing, "something else": found.outside}
     first = sorted(everything, key=lambda one: -everything[one])[:3]
     return ", ".join(f"{one} {100.0 * everything[one]:.0f} %" for one in first if everything[one] >= 0.005)
@@ -265,7 +265,7 @@ def odds(found: Posterior) -> str:
 def suggested(
     verdict: Verdict, found: Posterior, training: TrainingPours, measurement: Measurement, pours_in: PoursAt
 ) -> CandidateExperiments:
-    """What to measure next: a changed set-up and bodies if it is ambiguous, bodies alone if an answer is given."""
+    """What to measure next: a changed set-up and bodies if the verdict is ambiguous, otherwise bodies alone."""
     if not verdict.kind.startswith("ambiguous"):
         return CandidateExperiments(checked_by_bodies(verdict, found, training.declared, measurement), 0)
     weights = {label: found.effects[label] for label in verdict.names[:MOST_RIVALS]}
@@ -276,7 +276,7 @@ def suggested(
     candidates = next_experiment(
         training, found, weights, measurement.fit[0], lambda set_ups: pours_in(set_ups, place), bodies
     )
-    # It is chosen for the likeliest answers, and told of all that are left.
+    # The experiment is chosen for the likeliest answers; its rivals are all that remain.
     left = (*verdict.names, *(label for label in weights if label == BASE))
     return CandidateExperiments(tuple(replace(one, rivals=left) for one in candidates.suggestions), candidates.run_now)
 
@@ -289,7 +289,7 @@ def offered(condition: Condition, c: int, compared: Compared) -> Offered:
 
 
 def errors_of(conditions: Sequence[Condition], role: str, found: Conclusion) -> tuple[HoldoutError, ...]:
-    """Errors over the conditions of ``role``, but for those without a measured replicate or two pours of each model."""
+    """Errors over the conditions of ``role``, except those without a measured replicate or two pours of each model."""
     compared = []
     for c, condition in enumerate(conditions):
         measured, poured = replicates_of(condition), (found.before.blocks[c], found.after.blocks[c])

@@ -1,27 +1,27 @@
-"""What the features of a pour would be under any effect at any amplitude: one Bayesian regression taught by all pours.
+"""Emulator: one Bayesian regression on all pours predicts the features of a pour under any effect at any amplitude.
 
-Features are whitened, z = W y with W Σ Wᵀ = I for the covariance Σ of one pour, and turned onto the principal axes of
-the signatures. There a pour with parameters θ [standard deviations of their measurements] and effect e at a times its
-reference amplitude gives, feature by feature,
+Features are whitened, z = W y with W Σ Wᵀ = I for the covariance Σ of one pour, and rotated onto the principal axes of
+the signatures. There, for a pour with parameters θ [standard deviations of their measurements] and effect e at a times
+its reference amplitude, each feature is
 
     z = b + J θ + Q (θ² − 1) + β_e a + γ_e (a² − a) + ε,    ε ~ N(0, 1 + x_e a)
     b, J flat,    Q ~ N(0, BEND² J²),    β_e ~ N(0, v),    γ_e ~ N(0, CURVATURE² v)
 
-b is the base model, J what parameters do and Q how far that is from proportional, β_e a signature, γ_e how far the
-answer is from proportional, x_e by how much an effect makes pours scatter more (one number for all features; bodies
-that stick come down in lumps). All pours are in one regression: parameters are moved in every one of them, the base
-model is known better by what the effects do not move, and the errors that two models share are in both. What a
-signature may be is learned from all of them (v, one variance along each principal axis): effects of a granular pour
-move its features along few directions, and what a handful of pours shows in the others is mostly their scatter
-(empirical Bayes; Efron & Morris 1973, doi 10.1080/01621459.1973.10481350). Of an eigenvalue of the signatures' scatter
-only what exceeds the largest that noise alone makes, n (1 + √(D/m))² for m signatures of noise n in D features, counts
-(Marchenko & Pastur 1967, doi 10.1070/SM1967v001n04ABEH001994).
+b is the base model, J the linear response to the parameters and Q its departure from linearity; β_e is the signature of
+the effect, γ_e the departure of its response from proportionality, and x_e the excess scatter of pours under the effect
+(one number for all features; bodies that stick come down in lumps). All pours enter one regression: parameters vary in
+every pour, the base model is known better through features that the effects do not move, and errors that two models
+share appear in both. The prior variance v of a signature is learned from all signatures, one variance along each
+principal axis: effects of a granular pour move its features along few directions, and along the others a handful of
+pours shows mostly scatter (empirical Bayes; Efron & Morris 1973, doi 10.1080/01621459.1973.10481350). Of an eigenvalue
+of the signatures' scatter, only the excess over the largest that noise alone produces counts, n (1 + √(D/m))² for m
+signatures of noise n in D features (Marchenko & Pastur 1967, doi 10.1070/SM1967v001n04ABEH001994).
 
-Before all this each feature x of a pour becomes  s asinh((x − x̄)/(s σ)),  s = ``SQUASH``: counts and masses that are
-zero in most pours of the base model reach hundreds of its variances under an effect.
+Before all this each feature x of a pour becomes  s asinh((x − x̄)/(s σ)),  s = ``SQUASH``, because counts and masses
+that are zero in most pours of the base model reach hundreds of its variances under an effect.
 
-An effect with a direction in the plane is poured along +x, +y, −x and −y; between these its coefficients are the
-trigonometric interpolation, exact for what answers as 1, cos φ, sin φ and cos 2φ (``planar_weights``).
+An effect with a direction in the plane is poured along +x, +y, −x and −y. Between these its coefficients are found by
+trigonometric interpolation, exact for responses in 1, cos φ, sin φ and cos 2φ (``planar_weights``).
 """
 
 from __future__ import annotations
@@ -40,25 +40,25 @@ from doe.errors import StatisticsError
 FloatArray = npt.NDArray[np.float64]
 
 CURVATURE = 0.5
-"""Expected share by which the answer at twice an amplitude is off twice the answer; of the reference pours of
+"""Expected relative departure of the response at twice an amplitude from twice the response. In the reference pours of
 ``docs/limit.md`` half an amplitude gives 0.2 to 0.65 of a shift (mean 0.45)."""
 BEND = 0.25
-"""The same of a parameter. By the reference pours that of restitution is 0.2, and those of frictions are too small to
-be told."""
+"""The same for a parameter. In the reference pours it is 0.2 for restitution, and too small to be measured for the
+frictions."""
 SQUASH = 2.0
-"""Standard deviations of a pour up to which a feature counts in full."""
+"""Deviation [standard deviations of a pour] up to which a feature counts in full."""
 FLOOR = 0.3
-"""Share of the signatures' variance off the leading axes, where noise hides it, that is believed there."""
+"""Fraction of the signatures' variance off the leading axes, where noise hides it, that the prior retains."""
 LEAST_VARIANCE = 1e-3
-"""Of a signature along an axis, where its estimate comes out at nothing."""
+"""Least variance of a signature along an axis, for estimates near zero."""
 SCALES = np.geomspace(0.003, 3.0, 31)
-"""Sizes of a signature's variance beside that of all of them that are tried."""
+"""Trial values for the variance of one signature relative to that of all signatures."""
 FEW_POURS = 2.0
-"""Pours at the reference amplitude for which the belief counts that an effect leaves the scatter of a pour as it is."""
+"""Weight of the prior belief that an effect leaves the scatter unchanged [pours at the reference amplitude]."""
 SCATTERS = (0.5, 4.0)
-"""Range of the variance of a pour under an effect over that of the base model's."""
+"""Range of the ratio of a pour's variance under an effect to that of a base-model pour."""
 FLAT = 1e-9
-"""Prior precision of what nothing is assumed of."""
+"""Prior precision of coefficients with a flat prior."""
 ANGLES = (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)
 """Directions [rad] in the plane in which an effect with two amplitudes is poured."""
 
@@ -70,13 +70,13 @@ class Way:
     Attributes
     ----------
     effect, name
-        The effect's name, and that with its sign or axis.
+        The effect's name, and the same with its sign or axis.
     unit
         Reference amplitude [natural units].
     most
-        Multiple of it up to which the literature supports the effect.
+        Largest multiple of ``unit`` that the literature supports.
     angle
-        Direction in the plane, one of ``ANGLES``; None of an effect with one amplitude.
+        Direction in the plane, one of ``ANGLES``; None for an effect with one amplitude.
     """
 
     effect: str
@@ -88,16 +88,16 @@ class Way:
 
 @dataclass(frozen=True)
 class Lessons:
-    """Pours that teach, of which every condition came to a valid end and could be read.
+    """Training pours that came to a valid end and could be read in every condition.
 
     Attributes
     ----------
     theta
         Parameters [standard deviations from their means], (n, k).
     way, amplitude
-        Number of the way that acts, −1 for the base model, and multiple of its reference amplitude, (n,).
+        Index of the way that acts, −1 for the base model, and multiple of its reference amplitude, (n,).
     own
-        Which of them count for the covariance of a pour, (n,): not another one of them that is looked at otherwise.
+        Whether a pour counts for the covariance of a pour, (n,); False for another view of a pour already counted.
     blocks
         Features by condition, (n, d_c).
     """
@@ -112,7 +112,7 @@ class Lessons:
         return len(self.way)
 
     def joined(self, other: Lessons) -> Lessons:
-        """These and ``other``."""
+        """Return these pours followed by ``other``."""
         return Lessons(
             np.concatenate([self.theta, other.theta]),
             np.concatenate([self.way, other.way]),
@@ -122,41 +122,41 @@ class Lessons:
         )
 
     def only(self, columns: Sequence[npt.NDArray[np.int64]]) -> Lessons:
-        """The same with the features ``columns`` of each condition."""
+        """Return the pours with only the features ``columns`` of each condition."""
         kept = tuple(block[:, some] for block, some in zip(self.blocks, columns, strict=True))
         return replace(self, blocks=kept)
 
     def where(self, rows: npt.NDArray[np.bool_]) -> Lessons:
-        """Those of the pours."""
+        """Return the pours selected by ``rows``."""
         blocks = tuple(block[rows] for block in self.blocks)
         return Lessons(self.theta[rows], self.way[rows], self.amplitude[rows], self.own[rows], blocks)
 
     def groups(self) -> npt.NDArray[np.int64]:
-        """Number of the group, pours of one way at one amplitude, that each pour belongs to, (n,)."""
+        """Index of each pour's group, (n,); a group is all pours of one way at one amplitude."""
         pairs = np.column_stack([self.way, self.amplitude])
         return np.asarray(np.unique(pairs, axis=0, return_inverse=True)[1].reshape(-1), dtype=np.int64)
 
 
 @dataclass(frozen=True)
 class Squash:
-    """Centre and standard deviation of the features of a condition, (d_c,)."""
+    """Compresses the tails of a condition's features, which have this centre and standard deviation, (d_c,)."""
 
     centre: FloatArray
     deviation: FloatArray
 
     def __call__(self, pours: FloatArray) -> FloatArray:
-        """Features of pours, (n, d_c), with their far tails drawn in."""
+        """Features of ``pours``, (n, d_c), with their tails compressed."""
         return np.asarray(SQUASH * np.arcsinh((pours - self.centre) / (SQUASH * self.deviation)), dtype=np.float64)
 
     def slope(self, pours: FloatArray) -> FloatArray:
-        """Derivative at ``pours``."""
+        """Derivative of the compressed features at ``pours``."""
         x = (pours - self.centre) / (SQUASH * self.deviation)
         return np.asarray(1.0 / (self.deviation * np.sqrt(1.0 + x**2)), dtype=np.float64)
 
 
 @dataclass(frozen=True)
 class Emulator:
-    """All models of a declared scene; D features in all conditions together, k parameters, m ways.
+    """All models of a declared scene, with D features in all conditions together, k parameters and m ways.
 
     Attributes
     ----------
@@ -167,15 +167,15 @@ class Emulator:
     mean, covariance
         Of the c coefficients (b, J, β_1 … β_m, γ_1 … γ_m, Q) of every feature: (D, c = 1 + 2k + 2m) and (D, c, c).
     information
-        Xᵀ X of the pours that taught it, (c, c).
+        Xᵀ X of the training pours, (c, c).
     freedom
         Degrees of freedom of Σ.
     squashes, whitening
-        From the features of pours to z: by condition, and W (D, D) with its turn.
+        Map from the features of pours to z: tail compression by condition, then W (D, D) including the rotation.
     reached
         Largest multiple of its reference amplitude at which each way was poured.
     excess
-        x, by how much the variance of a pour grows per reference amplitude of each way, (m,).
+        x, growth of the variance of a pour per reference amplitude of each way, (m,).
     """
 
     ways: tuple[Way, ...]
@@ -190,20 +190,20 @@ class Emulator:
     excess: FloatArray
 
     def seen(self, pours: Sequence[FloatArray], weights: Sequence[FloatArray] | None = None) -> FloatArray:
-        """Mean of ``pours``, z (D,), of the same weight or of ``weights`` in each condition."""
+        """Mean of ``pours`` as z (D,); ``weights`` of the pours in each condition are equal by default."""
         weights = [np.ones(len(block)) for block in pours] if weights is None else weights
         of_all = zip(self.squashes, pours, weights, strict=True)
         means = [np.average(squash(block), axis=0, weights=some) for squash, block, some in of_all]
         return np.asarray(self.whitening @ np.concatenate(means), dtype=np.float64)
 
     def whitened(self, condition: int, pours: FloatArray) -> FloatArray:
-        """What ``pours`` (n, d_c) in a condition contribute to z, (n, D)."""
+        """Contribution of ``pours`` (n, d_c) in one condition to z, (n, D)."""
         sizes = [len(squash.centre) for squash in self.squashes]
         first = sum(sizes[:condition])
         return np.asarray(self.squashes[condition](pours) @ self.whitening[:, first : first + sizes[condition]].T)
 
     def features(self, z: FloatArray) -> FloatArray:
-        """Features (..., D) of all conditions, natural units, that ``z`` (..., D) stands for."""
+        """Features (..., D) of all conditions, natural units, that correspond to ``z`` (..., D)."""
         drawn_in = np.linalg.solve(self.whitening, np.atleast_2d(z).T).T
         centre = np.concatenate([squash.centre for squash in self.squashes])
         deviation = np.concatenate([squash.deviation for squash in self.squashes])
@@ -211,28 +211,28 @@ class Emulator:
 
     @property
     def slopes(self) -> FloatArray:
-        """J, what each parameter does per standard deviation of its measurement, (D, k)."""
+        """J, response to each parameter per standard deviation of its measurement, (D, k)."""
         return self.mean[:, 1 : 1 + self.parameters]
 
     @property
     def bends(self) -> FloatArray:
-        """Q, (D, k)."""
+        """Q, departure of the response to each parameter from linearity, (D, k)."""
         return self.mean[:, 1 + self.parameters + 2 * len(self.ways) :]
 
     def moved(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """What parameters ``theta`` (n, k) do and its variance, (n, D), and by which slopes, (n, D, k)."""
+        """Shift by parameters ``theta`` (n, k) and its variance, (n, D) each, and the slopes there, (n, D, k)."""
         own, first = np.diagonal(self.covariance, axis1=1, axis2=2), 1 + self.parameters + 2 * len(self.ways)
-        # Of J that of θ ~ N(0, I), so that no model gains by a small θ.
+        # The variance of J is averaged over θ ~ N(0, I), so that no model gains by a small θ.
         variance = own[:, 1 : 1 + self.parameters].sum(axis=1) + (theta**2 - 1.0) ** 2 @ own[:, first:].T
         slopes = self.slopes + 2.0 * theta[:, None, :] * self.bends
         return theta @ self.slopes.T + (theta**2 - 1.0) @ self.bends.T, variance, slopes
 
     def row(self, acting: Mapping[int, float] | None = None) -> FloatArray:
-        """The row of the regression in which ways act at amplitudes ``acting``, parameters at their means."""
+        """Row of the regression for ways acting at the amplitudes ``acting``, with parameters at their means."""
         return self.weighted_row([({way: 1.0}, amplitude) for way, amplitude in (acting or {}).items()])
 
     def weighted_row(self, acting: Sequence[tuple[Mapping[int, float], float]]) -> FloatArray:
-        """The row in which weighted means of ways act at an amplitude each."""
+        """Row of the regression for weighted means of ways, each mean acting at its own amplitude."""
         first, m = 1 + self.parameters, len(self.ways)
         row = np.zeros(self.mean.shape[1])
         row[0] = 1.0
@@ -243,7 +243,7 @@ class Emulator:
         return row
 
     def placed(self, rows: FloatArray, theta: FloatArray) -> FloatArray:
-        """``rows`` with the parameters at ``theta`` (n, k)."""
+        """``rows`` with the parameters set to ``theta`` (n, k)."""
         first, last = 1 + self.parameters, 1 + self.parameters + 2 * len(self.ways)
         return np.concatenate([rows[:, :1], theta, rows[:, first:last], theta**2 - 1.0], axis=1)
 
@@ -251,23 +251,23 @@ class Emulator:
         """Means and variances of z, (n, D) each, for ``rows`` of the regression."""
         used = np.flatnonzero(np.any(rows != 0.0, axis=0))
         first, second = np.triu_indices(len(used))
-        # Cᵢⱼ and Cⱼᵢ at once, in one product of matrices.
+        # Cᵢⱼ and Cⱼᵢ together, in one matrix product.
         both = self.covariance[:, used[first], used[second]] * np.where(first == second, 1.0, 2.0)
         some = rows[:, used]
         return some @ self.mean[:, used].T, (some[:, first] * some[:, second]) @ both.T
 
     def scatter(self, rows: FloatArray) -> FloatArray:
-        """Sum over z of the covariance (n, n) of the means for ``rows`` between sets of as many teaching pours."""
+        """Covariance (n, n) of the means for ``rows`` over repeated sets of as many training pours, summed over z."""
         gained = rows @ self.covariance
         return np.einsum("dni,ij,dmj->nm", gained, self.information, gained, optimize=True)
 
     def noise(self, rows: FloatArray) -> FloatArray:
-        """Variance of a pour, (n,), for ``rows`` of the regression; 1 of the base model."""
+        """Variance of a pour, (n,), for ``rows`` of the regression; 1 for the base model."""
         return noise_of(rows[:, 1 + self.parameters : 1 + self.parameters + len(self.ways)], self.excess)
 
 
 def planar_weights(angle: float) -> dict[float, float]:
-    """Weights of the directions ``ANGLES`` in an effect that acts towards ``angle`` [rad]."""
+    """Weights of the directions ``ANGLES`` for an effect that acts towards ``angle`` [rad]."""
     c, s, second = math.cos(angle), math.sin(angle), 0.25 * math.cos(2.0 * angle)
     return dict(
         zip(
@@ -281,7 +281,7 @@ def planar_weights(angle: float) -> dict[float, float]:
 def emulated(
     lessons: Lessons, ways: Sequence[Way], weights: Sequence[float] | None = None, shrunk: bool = True
 ) -> Emulator:
-    """The emulator taught by pours.
+    """Fit the emulator to training pours.
 
     Parameters
     ----------
@@ -290,11 +290,11 @@ def emulated(
     ways
         Directions of effects.
     weights
-        By condition, pours of the data there over their mean over the conditions; 1 where they are as many everywhere.
-        A condition with more pours of data counts for more.
+        By condition, the number of measured pours over its mean over the conditions; by default equal numbers (1). A
+        condition with more measured pours counts for more.
     shrunk
-        Whether v is learned axis by axis. That tells effects apart best, and underrates what each does; without it v is
-        the whole variance of the signatures along every axis, as becomes an effect that many pours have taught.
+        Whether v is estimated axis by axis. This separates effects best but underestimates the size of each. Otherwise
+        v is the total variance of the signatures along every axis, which suits an effect with many training pours.
 
     Returns
     -------
@@ -303,7 +303,7 @@ def emulated(
     Raises
     ------
     StatisticsError
-        Where the base model or a way has fewer than two pours.
+        If the base model or a way has fewer than two pours.
     """
     names = ["base", *(way.name for way in ways)]
     for number, name in enumerate(names, start=-1):
@@ -318,7 +318,7 @@ def emulated(
     slopes = pooled_slopes(z, lessons.groups(), lessons.theta)
     shift = z - lessons.theta @ slopes
     shift -= shift[base].mean(axis=0)
-    # a β_e of least squares through the origin, way by way, and the variance of its noise.
+    # β_e by least squares through the origin, way by way, and the variance of its noise.
     square = np.array([(lessons.amplitude[lessons.way == w] ** 2).sum() for w in range(m)])
     signatures = np.stack([lessons.amplitude[lessons.way == w] @ shift[lessons.way == w] for w in range(m)] or [z[0]])
     noise = 1.0 / square + 1.0 / base.sum() if m else np.ones(1)
@@ -343,12 +343,12 @@ def emulated(
 
 
 def noise_of(amplitudes: FloatArray, excess: FloatArray) -> FloatArray:
-    """Variance of pours, (n,), in which the ways act at ``amplitudes`` (n, m)."""
+    """Variance of a pour, (n,), for ways acting at ``amplitudes`` (n, m)."""
     return np.asarray(np.clip(1.0 + amplitudes @ excess, *SCATTERS), dtype=np.float64)
 
 
 def _excess(z: FloatArray, lessons: Lessons, ways: int) -> FloatArray:
-    """x (m,) by least squares of the pours' squared deviations within their groups, drawn towards 0."""
+    """x (m,) by least squares on the pours' squared deviations within their groups, shrunk towards 0."""
     group = lessons.groups()
     several = (np.bincount(group) > 1)[group]
     square = (residuals_within(z, group, lessons.theta) ** 2).mean(axis=1)
@@ -362,9 +362,9 @@ def _excess(z: FloatArray, lessons: Lessons, ways: int) -> FloatArray:
 
 
 def signature_prior(signatures: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Prior variances v (D,) of ``signatures`` (m, D) of ``noise`` variance (m,) along their principal axes, and these.
+    """Prior variances v (D,) of ``signatures`` (m, D) along their principal axes, and these axes as columns, (D, D).
 
-    Axes are columns (D, D).
+    ``noise``: noise variance of each signature, (m,).
     """
     m, size = signatures.shape
     level = float(noise.mean())
@@ -375,11 +375,11 @@ def signature_prior(signatures: FloatArray, noise: FloatArray) -> tuple[FloatArr
 
 
 def signature_scales(signatures: FloatArray, noise: FloatArray, variances: FloatArray) -> FloatArray:
-    """s (m,): how large each of ``signatures`` (m, D), along the axes of ``variances`` (D,), is beside the others.
+    """s (m,): size of each of ``signatures`` (m, D), along the axes of ``variances`` (D,), relative to the others.
 
-    That of the largest likelihood of β̂ ~ N(0, s v + noise). What hardly does anything at the end of its range, as
-    twisting friction under a pile of small bodies, would else keep the freedom of what does much, and agree with data
-    of the base model better than the base model by the noise of its own pours.
+    Maximizes the likelihood of β̂ ~ N(0, s v + noise). Without s, an effect that does hardly anything at the end of its
+    range, such as twisting friction under a pile of small bodies, would keep the freedom of a strong effect and, by the
+    noise of its own pours, agree with data of the base model better than the base model does.
     """
     square = signatures[:, None] ** 2
     total = SCALES[None, :, None] * variances + noise[:, None, None]
@@ -390,12 +390,12 @@ def signature_scales(signatures: FloatArray, noise: FloatArray, variances: Float
 def regression(
     rows: FloatArray, z: FloatArray, slopes: FloatArray, variances: FloatArray, scales: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Mean (D, c) and covariance (D, c, c) of the c = 1 + 2k + 2m coefficients of every feature.
+    """Posterior mean (D, c) and covariance (D, c, c) of the c = 1 + 2k + 2m coefficients of every feature.
 
     Parameters
     ----------
     rows, z
-        Of each pour, (n, c) and (n, D).
+        Regressors and features of each pour, (n, c) and (n, D).
     slopes
         Mean square of J over the features, (k,).
     variances, scales
@@ -413,14 +413,14 @@ def regression(
 
 
 def _squash(own: Lessons, condition: int) -> Squash:
-    """By the mean of the base model's pours, and the deviations within all groups."""
+    """Centre from the mean of the base model's pours, deviation from the residuals within all groups."""
     block = own.blocks[condition]
     deviation = np.sqrt((residuals_within(block, own.groups(), own.theta) ** 2).mean(axis=0))
     return Squash(block[own.way == -1].mean(axis=0), np.where(deviation > 0.0, deviation, 1.0))
 
 
 def _whitening(drawn_in: Sequence[FloatArray], own: Lessons, weights: Sequence[float] | None) -> tuple[FloatArray, int]:
-    """W (D, D), block by condition, and the degrees of freedom."""
+    """W (D, D), block-diagonal by condition, and the degrees of freedom of Σ."""
     group = own.groups()
     covariances = [shrunk_covariance(residuals_within(block, group, own.theta)) for block in drawn_in]
     white = block_diag(*(np.linalg.inv(np.linalg.cholesky(one)) for one in covariances))

@@ -1,14 +1,14 @@
-"""Which experiment of the candidates tells the answers that are left apart, and with which chance.
+"""Rank the candidate experiments by their chance of telling the remaining answers apart.
 
-The chance of a set-up is how often the right answer is given, by the rules of ``verdict.py`` after a follow-up, once n
-pours of it are there: a truth is drawn by the probabilities that the answers have now, the mean of its n pours by what
-it predicts, and the answers are weighed by Bayes's theorem,
+The chance of a set-up is how often the right answer is given, by the rules of ``verdict.py`` after a follow-up, from n
+pours in it. A true answer is drawn with the present probabilities, the mean of its n pours is drawn from its
+prediction, and the answers are weighed by Bayes's theorem,
 
     data of i ~ N(m_i, 1/n + W_i),    p_j ∝ w_j N(data; m_j, 1/n + W_j)ᵀ
 
-in features whitened by the covariance of one pour, with W_i the covariance of what i predicts and T the temperature at
-which all data are weighed (``posterior.py``). This is the expected posterior of Box and Hill 1967
-(doi 10.1080/00401706.1967.10490441) counted as a laboratory would: an answer, or none.
+in features whitened by the covariance of one pour, with W_i the covariance of the prediction of i and T the temperature
+at which all data are weighed (``posterior.py``). This is the expected posterior of Box and Hill 1967 (doi
+10.1080/00401706.1967.10490441) counted as a laboratory would: an answer, or none.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD
 FloatArray = npt.NDArray[np.float64]
 
 DRAWS = 400
-"""Made-up data sets of each answer."""
+"""Simulated data sets per answer."""
 PLANNED, GIVEN_UP = (6, 12, 24), 0.05
-"""Pours that may be asked of a laboratory, and the chance that is given up for fewer."""
+"""Numbers of pours that may be asked of a laboratory, and the loss of chance accepted for fewer."""
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """What one answer, fitted to the data, expects: mean (d,) of its pours and the covariance (d, d) of that mean."""
+    """Prediction of one answer, fitted to the data: mean (d,) of its pours and the covariance (d, d) of that mean."""
 
     mean: FloatArray
     covariance: FloatArray
@@ -43,7 +43,7 @@ class Prediction:
 
 @dataclass(frozen=True)
 class CandidateExperiment:
-    """A feasible set-up, and what every answer that is left predicts there."""
+    """A feasible set-up, and the prediction of every remaining answer there."""
 
     name: str
     predictions: Mapping[str, Prediction]
@@ -52,10 +52,10 @@ class CandidateExperiment:
 def rank_experiments(
     candidates: Sequence[CandidateExperiment], weights: Mapping[str, float], replicates: float
 ) -> tuple[RankedExperiment, ...]:
-    """Return the candidates, the best chance of an answer first, the larger separation first among equals.
+    """Return the candidates in descending order of the chance of the right answer, ties by descending separation.
 
-    weights: probabilities of the answers that are left; replicates: pours that are asked for, infinity where nothing is
-    poured and all noise is in the predictions.
+    ``weights``: probabilities of the remaining answers. ``replicates``: pours asked for, infinity if nothing is poured
+    and all noise is in the predictions.
     """
     rows = [
         RankedExperiment(
@@ -69,7 +69,7 @@ def rank_experiments(
 def fewest_pours(
     candidates: Sequence[CandidateExperiment], weights: Mapping[str, float]
 ) -> tuple[int, tuple[RankedExperiment, ...]]:
-    """Return how many pours to ask for, the fewest that do nearly as well as the most, and the ranks by them."""
+    """Return the fewest pours whose chance is within ``GIVEN_UP`` of that of the most, and the ranking for them."""
     ranked = {n: rank_experiments(candidates, weights, n) for n in PLANNED}
     pours = min(n for n in PLANNED if ranked[n][0].chance >= ranked[max(PLANNED)][0].chance - GIVEN_UP)
     return pours, ranked[pours]
@@ -78,9 +78,9 @@ def fewest_pours(
 def chance_of_an_answer(
     item: CandidateExperiment, weights: Mapping[str, float], replicates: float, seed: int = 0
 ) -> float:
-    """Return how often the true answer is given, by `DRAWS` made-up data sets of each.
+    """Return how often the true answer is given, estimated from ``DRAWS`` simulated data sets per answer.
 
-    Answers beyond `weights`, which nothing was poured for, fare as the wrong ones of these do; none of them is found.
+    Answers outside ``weights``, for which nothing was poured, fare like the wrong ones among them; none is ever found.
     """
     names, rng = tuple(weights), np.random.default_rng(seed)
     prior = np.array(list(weights.values()))

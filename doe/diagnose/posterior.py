@@ -1,24 +1,24 @@
-"""How probable is it that nothing is missing, that an effect is, or that something else is: one posterior.
+"""Posterior probabilities that nothing is missing, that an effect is, or that something outside the library is.
 
-The mean z of n pours per condition, whitened by the covariance Σ of one pour, is compared with what each model gives by
-the emulator that they share (``emulator.py``), of mean m(e, a) and variance u(e, a) feature by feature:
+The mean z of n pours per condition, whitened by the covariance Σ of one pour, is compared with the prediction of each
+model by the emulator that they share (``emulator.py``), with mean m(e, a) and variance u(e, a) feature by feature:
 
     effect e at amplitude a             z ~ t( m(e, a),  diag(u(e, a) + w + r(e, a)/n) + J Jᵀ + I Iᵀ )
     nothing missing                     z ~ t( m₀,       diag(u₀ + w + r/n) + J Jᵀ + I Iᵀ )
     something outside the library       z ~ t( m₀,       diag(u₀ + w + r/n + s²) + J Jᵀ + I Iᵀ )
 
-Σ is known by ν degrees of freedom, those of all conditions together. Integrated over it, the density of D features at
-distance q is (1 + q/ν)^(−(ν+1)/2), a multivariate t of ν − D + 1 degrees of freedom (Geisser and Cornfield 1963, J. R.
-Stat. Soc. B 25:368): the more features a Σ of few pours whitens, the less a distance says. J is what a parameter does
-per standard deviation of its measurement, w the variance of what is not known of J, so parameters are integrated out:
-about their best fit under each model, where J is the slope (Laplace), for the answer to a parameter is bent. I
-holds the stated errors of instruments, r ≥ 1 is the variance of the data's replicates over the simulated one, or that
-of pours under the effect where it is more.
-The evidence of an effect is the mean over amplitudes, evenly over their logarithm, over its signs and over its
-directions in the plane; that of the outside over s. Two effects act by the sum of what each does, and their amplitudes
-are summed as finely as the data tell them apart (``doe/analysis/cells.py``). The posterior is P ∝ p Zᵀ for prior p,
-evidence Z and temperature T (``TEMPERATURE``): below one it is less sure than the evidence says, for features are not
-quite normal and models not quite linear.
+Σ is known with ν degrees of freedom, those of all conditions together. With Σ integrated out, the density of D features
+at distance q is (1 + q/ν)^(−(ν+1)/2), a multivariate t with ν − D + 1 degrees of freedom (Geisser and Cornfield 1963,
+J. R. Stat. Soc. B 25:368): the more features are whitened by a Σ from few pours, the less a distance says. J is the
+response to a parameter per standard deviation of its measurement, and w the variance due to the error in J. Parameters
+are integrated out about their best fit under each model, with J the slope there (Laplace), because the response to a
+parameter is not linear. I holds the stated errors of instruments. r ≥ 1 is the variance of the data's replicates over
+the simulated one, or the variance of pours under the effect if that is larger.
+The evidence of an effect is the mean over its amplitudes (evenly in their logarithm), its signs and its directions in
+the plane; the evidence of something outside is the mean over s. Two effects together shift the features by the sum of
+their shifts, and their amplitudes are summed as finely as the data tell them apart (``doe/analysis/cells.py``). The
+posterior is P ∝ p Zᵀ for prior p, evidence Z and temperature T (``TEMPERATURE``). With T below one it is less certain
+than the evidence says, because features are not quite normal and models not quite linear.
 """
 
 from __future__ import annotations
@@ -42,53 +42,53 @@ from doe.diagnose.result import Amplitude
 FloatArray = npt.NDArray[np.float64]
 
 NOTHING, OUTSIDE, PAIRS = 0.5, 0.1, 0.03
-"""Prior probabilities that nothing is missing, for most models are not wrong, of what no library holds, and of two
-effects at once; single effects share the rest alike, and pairs theirs. Effects that came independently would meet in
-0.1 of all cases. It is less, for then all pairs with it would take half of what is a single effect's; with 0.01 the
-stronger one of two was named alone in 3 of 30 data sets of pairs (root 5, by scans and by scalars), with 0.03 in 1."""
+"""Prior probabilities that nothing is missing, that something outside the library is, and that two effects are. Single
+effects share the rest equally, and pairs share theirs. Independent effects would occur together in 0.1 of all cases;
+the prior is smaller, because the pairs with an effect would otherwise take half of what is its own. With 0.01 the
+stronger of two was named alone in 3 of 30 data sets of pairs (root 5, by scans and by scalars), with 0.03 in 1."""
 TEMPERATURE = 0.7
-"""One of the two numbers that are tuned on development sets; the other is ``verdict.THRESHOLD``. The stated loss: a
-wrong name counts as ten sets without one. On reference pours judged by the pours that teach a model (``docs/limit.md``,
-9) none of 244 is named wrongly at 0.7, and up to four are at 1. ``explorer validate-diagnosis`` prints what other
-temperatures would have made of its sets."""
+"""One of the two numbers tuned on development sets; the other is ``verdict.THRESHOLD``. The stated loss: one wrong name
+counts as ten sets without a name. On reference pours judged by a model's training pours (``docs/limit.md``, 9) none of
+244 is named wrongly at 0.7, and up to four are at 1. ``explorer validate-diagnosis`` prints what other temperatures
+would have given on its sets."""
 LEAST, STEP, BEYOND = 0.12, 1.05, 1.6
-"""Least multiple of the reference amplitude (an effect of 12 σ can hardly be seen there), factor between two of them,
-and how far beyond what has been poured a model is extrapolated."""
+"""Smallest multiple of the reference amplitude (an effect of 12 σ is hardly visible there), ratio of successive
+multiples, and factor by which a model is extrapolated beyond what has been poured."""
 DIRECTIONS = 24
-"""Directions in the plane over which an effect with two amplitudes is summed."""
+"""Number of directions in the plane over which an effect with two amplitudes is summed."""
 SPREADS = np.geomspace(0.3, 6.0, 6)
-"""Shifts by something outside [standard deviations of one pour in every feature]."""
+"""Shifts by something outside the library [standard deviations of one pour in every feature]."""
 FITS = 0.01
-"""Probability of data as far off as these, below which a model does not fit: one right model in 100 is lost. With 0.002
-the stronger one of two effects was named at 0.004 (root 1); right ones lie evenly between 0 and 1."""
+"""Probability of data at least as far off as these below which a model does not fit: one right model in 100 is lost.
+With 0.002 the stronger of two effects was named at 0.004 (root 1); for right models it is uniform between 0 and 1."""
 PAIRED_BELOW = 0.1
-"""Probability of nothing missing below which pairs of effects are weighed too, for they cost seconds: where something
-is missing, the most probable single effect may be the stronger one of two."""
+"""Probability of nothing missing below which pairs of effects are weighed too, at a cost of seconds: where something is
+missing, the most probable single effect may be the stronger one of two."""
 SECOND = 4.0
-"""Least shift by either of two effects [standard errors of the data]: a second one that nobody could see would take its
-share of the probability from the first alone."""
+"""Least shift by each of two effects [standard errors of the data]. A second effect that nobody could see would take
+its share of the probability from the first alone."""
 AT_ONCE = 20_000
-"""Nodes that are weighed at once."""
+"""Number of nodes weighed in one batch."""
 STEPS, FARTHEST = 4, 4.0
-"""Steps to the best fit of the parameters, and how far from their means these may be [standard deviations]."""
+"""Steps to the best fit of the parameters, and their largest distance from their means [standard deviations]."""
 
 
 @dataclass(frozen=True)
 class Data:
-    """What was measured, whitened by an emulator.
+    """Measured data, whitened by an emulator.
 
     Attributes
     ----------
     z
         Mean of the features, (D,).
     replicates
-        n, pours in each condition.
+        n, number of pours in each condition.
     scatter
-        r, variance of the replicates over that of simulated pours, 1 at least.
+        r, variance of the replicates over that of simulated pours, at least 1.
     instrument
-        I, (D, q), without columns where nothing is stated.
+        I, (D, q), without columns if no errors are stated.
     bodies
-        What was measured of single bodies.
+        Measurements of single bodies.
     """
 
     z: FloatArray
@@ -112,18 +112,18 @@ class Fit:
     theta, theta_covariance
         Posterior of the parameters [standard deviations of their measurements], (k,) and (k, k).
     slopes
-        What parameters do there, (D, k).
+        Response to the parameters there, (D, k).
     z, variance
-        What it gives at its best amplitude and parameters, (D,), and the variance of the data about that which neither
-        parameters nor instruments make.
+        Prediction at its best amplitude and parameters, (D,), and the variance of the data about it that is due to
+        neither parameters nor instruments, (D,).
     still
-        What it gives at its best amplitude with the parameters at the means of their measurements, (D,).
+        Prediction at its best amplitude with the parameters at the means of their measurements, (D,).
     unsure
-        The part of that variance that more pours of the model would take away, u, (D,).
+        u, the part of ``variance`` that more pours of the model would remove, (D,).
     log_evidence
         ln Z.
     p
-        Probability of data at least as far off as these, without outliers, were the model at its best amplitude true.
+        Probability of data at least as far off as these, without outliers, if the model is true at its best amplitude.
     """
 
     label: str
@@ -141,7 +141,7 @@ class Fit:
 
 @dataclass(frozen=True)
 class BestAmplitude:
-    """The best amplitude of way ``way``, in multiples of its reference amplitude, and its log density there."""
+    """The best amplitude of the way ``way``, as a multiple of its reference amplitude, and the log density there."""
 
     way: int
     amplitude: float
@@ -150,20 +150,20 @@ class BestAmplitude:
 
 @dataclass(frozen=True)
 class Posterior:
-    """Probabilities that add up to one.
+    """Posterior probabilities, which add up to one.
 
     Attributes
     ----------
     nothing, outside
-        Of nothing missing, and of something outside the library.
+        That nothing is missing, and that something outside the library is.
     effects
-        Of single effects, and of pairs "a+b" where they were weighed.
+        Of single effects, and of pairs "a+b" if they were weighed.
     fits
         Best fit of the base model, of each effect and of the likely pairs.
     levels
         Best amplitude of every way.
     log_outside
-        ln Z of something outside.
+        ln Z of something outside the library.
     """
 
     nothing: float
@@ -175,7 +175,7 @@ class Posterior:
 
     @property
     def best(self) -> tuple[str, float]:
-        """The most probable effect, or pair, and its probability."""
+        """The most probable effect or pair, and its probability."""
         return max(self.effects.items(), key=lambda item: item[1])
 
     def missing(self, label: str) -> float:
@@ -184,17 +184,17 @@ class Posterior:
 
 
 def holds(one: str, other: str) -> bool:
-    """Whether the effect or pair ``one`` has all effects of ``other``."""
+    """Whether the effect or pair ``one`` contains all effects of ``other``."""
     return set(other.split("+")) <= set(one.split("+"))
 
 
 @dataclass(frozen=True)
 class _Nodes:
-    """Amplitudes over which the evidence of a model is summed, with the rows of the regression.
+    """Amplitudes over which the evidence of a model is summed, with their rows of the regression.
 
-    ``natural``: (n, p) of all its effects in turn. ``ends``: where an amplitude is the largest. ``way``, ``multiple``:
-    the way and multiple that a node is, of one effect. ``step``: factor from one amplitude to the next. ``share``: log
-    of the share of the prior that each stands for; the same of all where it is empty.
+    ``natural``: amplitudes of all its effects in turn, (n, p). ``ends``: whether an amplitude is the largest. ``way``,
+    ``multiple``: way and multiple of each node, for a single effect. ``step``: ratio of successive amplitudes.
+    ``share``: log of each node's share of the prior; empty for equal shares.
     """
 
     rows: FloatArray
@@ -207,14 +207,14 @@ class _Nodes:
 
 
 def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, pairs: bool = True) -> Posterior:
-    """The posterior of a data set.
+    """Weigh all models by one data set.
 
     Parameters
     ----------
     emulator
-        Taught by pours of the base model and of every effect.
+        Fitted to pours of the base model and of every effect.
     data
-        Whitened by it.
+        Whitened by ``emulator``.
     temperature
         T.
     pairs
@@ -235,7 +235,7 @@ def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, 
     number, priors = len(singles), priors_of(tuple(singles))
     weighed = {name: _weight(priors[name], fits[name].log_evidence, temperature) for name in singles}
     nothing = _weight(priors["base"], fits["base"].log_evidence, temperature)
-    # Single bodies are as declared where something outside acts on a pour.
+    # Something outside the library that acts on a pour leaves single bodies as declared.
     log_outside = float(logsumexp(spread) + weigher.of_bodies("base", base)[0]) - math.log(len(SPREADS))
     outside = _weight(priors["outside"], log_outside, temperature)
     if (
@@ -265,7 +265,7 @@ def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, 
 
 
 def fitted(emulator: Emulator, data: Data, label: str) -> Fit:
-    """The best fit of one model: "base", an effect, or "a+b"."""
+    """Best fit of one model: "base", an effect, or "a+b"."""
     weigher = _Weigher(emulator, data)
     if "+" in label:
         return _pairs(weigher, {name: _nodes_of(emulator, name) for name in label.split("+")}, 0.0, -math.inf)[label]
@@ -274,11 +274,11 @@ def fitted(emulator: Emulator, data: Data, label: str) -> Fit:
 
 
 def gain_by_pours(one: Fit, other: Fit, emulator: Emulator, data: Data) -> float:
-    """By how much the log evidence of one model over another would rise at most were both known exactly.
+    """Largest rise of the log evidence of ``one`` over ``other`` if both models were known exactly.
 
-    The expected log evidence of a right model over a wrong one is ½ Δᵀ S⁻¹ Δ, Δ between what the two give and S the
-    covariance of the data about them; with u left out of S it is what any number of pours could make of it. Where the
-    data's own noise is most of S, that is nothing.
+    The expected log evidence of a right model over a wrong one is ½ Δᵀ S⁻¹ Δ, with Δ the difference of their
+    predictions and S the covariance of the data about them. Without u in S it is the limit for any number of pours; the
+    rise is this limit minus the present value. It is negligible if the data's own noise dominates S.
     """
     loadings, apart = np.concatenate([emulator.slopes, data.instrument], axis=1), one.still - other.still
     noise, unsure = 0.5 * (one.variance + other.variance), 0.5 * (one.unsure + other.unsure)
@@ -290,7 +290,7 @@ def gain_by_pours(one: Fit, other: Fit, emulator: Emulator, data: Data) -> float
 
 
 def priors_of(effects: Sequence[str]) -> dict[str, float]:
-    """Prior probability of "base", of "outside" and of each of ``effects`` alone."""
+    """Prior probabilities of "base", of "outside" and of each of ``effects`` alone."""
     rest = 1.0 - NOTHING - OUTSIDE - PAIRS
     return {"base": NOTHING, "outside": OUTSIDE} | {name: rest / len(effects) for name in effects}
 
@@ -300,7 +300,7 @@ def _weight(prior: float, log_evidence: float, temperature: float) -> float:
 
 
 def _nodes_of(emulator: Emulator, effect: str) -> _Nodes:
-    """All amplitudes, signs and directions of ``effect``."""
+    """Nodes for all amplitudes, signs and directions of ``effect``."""
     ways = [(number, way) for number, way in enumerate(emulator.ways) if way.effect == effect]
     nodes = []
     planar = [number for number, way in ways if way.angle is not None]
@@ -329,13 +329,14 @@ def _top(emulator: Emulator, way: int) -> float:
 
 
 def multiples(top: float) -> FloatArray:
-    """From ``LEAST`` to ``top``, evenly over the logarithm, in whole cells."""
+    """Multiples from ``LEAST`` to ``top``, evenly spaced in the logarithm, in whole cells."""
     return np.geomspace(min(LEAST, top), top, CELL * max(1, round(math.log(top / LEAST) / math.log(STEP) / CELL)))
 
 
 def _pairs(weigher: _Weigher, singles: Mapping[str, _Nodes], least: float, floor: float) -> dict[str, Fit]:
-    """Fits of every two effects acting at once, each shifting the data by ``least`` standard errors; coarse ones where
-    the log evidence does not come up to ``floor``, or near that of another pair.
+    """Fits of every two effects acting together, each shifting the data by at least ``least`` standard errors.
+
+    Fits are coarse where the log evidence is below ``floor`` or far below that of another pair.
     """
     shifts = {name: weigher.shifts(nodes.rows) for name, nodes in singles.items()}
     found: dict[str, Fit] = {}
@@ -349,7 +350,7 @@ def _pairs(weigher: _Weigher, singles: Mapping[str, _Nodes], least: float, floor
 def _pair(
     weigher: _Weigher, label: str, members: Sequence[_Nodes], shifts: Sequence[FloatArray], least: float, floor: float
 ) -> Fit:
-    """The fit of ``members`` acting at once, whose nodes shift the data by ``shifts``."""
+    """Fit of ``members`` acting together; their nodes shift the data by ``shifts`` [standard errors]."""
     one, other = members
 
     def at(i: Places, j: Places, step: float = STEP) -> _Nodes:
@@ -366,28 +367,30 @@ def _pair(
 
 
 class _Weigher:
-    """Densities of one data set under rows of the regression."""
+    """Densities of one data set for rows of the regression."""
 
     def __init__(self, emulator: Emulator, data: Data) -> None:
         self._emulator, self._data = emulator, data
         self.base = _Nodes(emulator.row()[None], np.zeros((1, 0)), np.zeros(1, bool))
-        # Σ is known condition by condition, each by as many pours.
+        # Σ is estimated condition by condition, each from the same number of pours.
         self._freedom = emulator.freedom * len(emulator.squashes)
 
     def at(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Means and variances (n, D) of the data under ``rows``."""
+        """Means and variances of the data, (n, D) each, for ``rows``."""
         mean, variance = self._emulator.at(rows)
         noise = np.maximum(self._data.scatter, self._emulator.noise(rows)) / self._data.replicates
         return mean, variance + noise[:, None]
 
     def shifts(self, rows: FloatArray) -> FloatArray:
-        """How far the data of ``rows`` are off those of the base model [standard errors], (n,)."""
+        """Distance of the data predicted by ``rows`` from those of the base model [standard errors], (n,)."""
         means = self._emulator.at(np.concatenate([self.base.rows, rows]))[0]
         return np.asarray(np.sqrt(self._data.replicates) * np.linalg.norm(means[1:] - means[0], axis=1))
 
     def bent(self, mean: FloatArray, variance: FloatArray) -> tuple[FloatArray, ...]:
-        """θ (n, k) by Gauss and Newton; the data less the answer there made straight, at θ = 0, its variance and the
-        answer's, (n, D); and slopes there (n, D, k).
+        """Fit the parameters by Gauss–Newton and linearize the prediction there.
+
+        Returns θ (n, k); the data less the linearized prediction at θ = 0, its variance, and the prediction at the fit,
+        (n, D) each; and the slopes there, (n, D, k).
         """
         theta = np.zeros((len(mean), self._emulator.parameters))
         for _ in range(STEPS):
@@ -399,24 +402,24 @@ class _Weigher:
         return theta, left, variance + unsure, mean + moved, slopes
 
     def log_t(self, mean: FloatArray, variance: FloatArray) -> FloatArray:
-        """Log densities (n,) of the data."""
+        """Log densities (n,) of the data for predictions with ``mean`` and ``variance``, (n, D) each."""
         _, left, variance, _, slopes = self.bent(mean, variance)
         instrument = np.broadcast_to(self._data.instrument, (*left.shape, self._data.instrument.shape[1]))
         return log_t(left, variance, np.concatenate([slopes, instrument], axis=2), self._freedom)
 
     def densities(self, label: str, nodes: _Nodes) -> FloatArray:
-        """Log densities (n,) of the data under ``nodes``."""
+        """Log densities (n,) of the data under ``nodes``, single bodies included."""
         starts, rows = range(0, len(nodes.rows), AT_ONCE), nodes.rows
         parts = [self.log_t(*self.at(rows[first : first + AT_ONCE])) for first in starts]
         return np.concatenate(parts) + self.of_bodies(label, nodes)
 
     def of_bodies(self, label: str, nodes: _Nodes) -> FloatArray:
-        """Log densities (n,) of what was measured of single bodies, but for a constant."""
+        """Log densities (n,) of the measurements of single bodies, up to a constant."""
         bodies = self._data.bodies
         return np.zeros(len(nodes.rows)) if bodies is None else bodies.log_density(label, nodes.natural, nodes.step)
 
     def fit(self, label: str, nodes: _Nodes, logs: FloatArray) -> Fit:
-        """The model at its best node, with what all nodes say of its amplitudes."""
+        """The model at its best node, with amplitudes and evidence from all nodes."""
         best = int(logs.argmax())
         mean, noise = (one[0] for one in self.at(nodes.rows[best : best + 1]))
         theta, d, noise, z, slopes = (one[0] for one in self.bent(mean[None], noise[None]))
@@ -451,7 +454,7 @@ class _Weigher:
 
 
 def _spread_of(values: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
-    """Mean and 95 % interval of ``values`` of ``weights``, linear between them."""
+    """Mean and 95 % interval of ``values`` with ``weights``, interpolated linearly between them."""
     order = np.argsort(values)
     below = np.cumsum(weights[order]) - 0.5 * weights[order]
     low, high = np.interp([0.025, 0.975], below, values[order])

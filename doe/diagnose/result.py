@@ -1,6 +1,6 @@
-"""What a diagnosis finds, as plain records. Reading them loads nothing that compiles.
+"""The findings of a diagnosis as plain records. Reading them loads nothing that compiles.
 
-A label is ``BASE``, an effect, or a pair "a+b"; an answer is ``NO_EFFECT``, ``UNEXPLAINED``, or a label but the base.
+A label is ``BASE``, an effect, or a pair "a+b". An answer is ``NO_EFFECT``, ``UNEXPLAINED``, or any label but ``BASE``.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ BASE = "base"
 """Label of the declared model without an effect."""
 NO_EFFECT, UNEXPLAINED = "no_missing_effect", "unexplained"
 BODIES_ALONE = "single bodies, without a pour"
-"""Name of the experiment that pours nothing."""
+"""Name of the experiment that needs no pour."""
 
 
 @dataclass(frozen=True)
 class Amplitude(Record):
-    """One amplitude of one effect, natural units: posterior mean and 95 % interval.
+    """One amplitude of one effect in natural units: posterior mean and 95 % interval.
 
-    ``at_end``: the best one is the largest of those that the models reach, or that the literature supports.
+    ``at_end``: whether the best amplitude is the largest that the models reach, or that the literature supports.
     """
 
     effect: str
@@ -35,32 +35,32 @@ class Amplitude(Record):
 
 @dataclass(frozen=True)
 class EffectRow(Record):
-    """One effect, or a pair that was weighed.
+    """One effect, or one pair of effects that was weighed.
 
     Attributes
     ----------
     name
         The effect, or "a+b".
     probability
-        Posterior.
+        Posterior probability.
     log_evidence
-        ln of its evidence over that of the base model.
+        ln of its evidence relative to that of the base model.
     amplitudes
         At its best fit.
     p
-        Probability of data as far off as these, were its best fit true.
+        Probability of data at least as far off as these if its best fit were true.
     reference
-        The amplitude that its signature was poured at, "+" and "x" direction first; empty of a pair.
+        Amplitude at which its signature was poured, in its "+" or "x" direction; empty for a pair.
     strength
-        Shift by that amplitude in the features that are compared, after recalibration [standard errors of the data].
+        Shift of the compared features at the reference amplitude, after recalibration [standard errors of the data].
     fitted_strength
-        The same by its best fit.
+        The same at its best fit.
     cosine
-        Of its best fit's shift to the residual, after recalibration.
+        Between the shift at its best fit and the residual, after recalibration.
     pours
-        That taught it, in every condition.
+        Number of its training pours, in every condition.
     beside
-        Posterior of the pairs that an effect is one of.
+        Posterior probability of the pairs that contain the effect.
     """
 
     name: str
@@ -77,13 +77,13 @@ class EffectRow(Record):
 
     @property
     def missing(self) -> float:
-        """Probability that it is missing, alone or with others."""
+        """Probability that the effect is missing from the declared model, alone or with others."""
         return self.probability + self.beside
 
 
 @dataclass(frozen=True)
 class ParameterRow(Record):
-    """A calibrated parameter, natural units: its measurement, and its posterior without and with what is named."""
+    """A calibrated parameter, natural units: its measurement, and its posterior under the base and the final model."""
 
     name: str
     low: float
@@ -98,8 +98,8 @@ class ParameterRow(Record):
 
 @dataclass(frozen=True)
 class Residual(Record):
-    """One feature: measured mean, calibrated base model and final model, natural units, and both residuals over the
-    standard deviation of noise, model and instrument, after recalibration.
+    """One feature in natural units: measured mean, calibrated base model and final model. ``z_before``, ``z_after``:
+    residuals of both models over the standard deviation of noise, model and instrument, after recalibration.
     """
 
     condition: str
@@ -113,7 +113,7 @@ class Residual(Record):
 
 @dataclass(frozen=True)
 class Place(Record):
-    """A condition: its share of the squared residuals of the base model, and the feature that is farthest off."""
+    """A condition: its share of the base model's squared residuals, and its feature with the largest residual."""
 
     condition: str
     share: float
@@ -123,12 +123,12 @@ class Place(Record):
 
 @dataclass(frozen=True)
 class Level(Record):
-    """A direction with the share of its range at which it was found to shift enough (``training_amplitudes.py``)."""
+    """A direction and the share of its range at which its shift was found sufficient (``training_amplitudes.py``)."""
 
     direction: Direction
     share: float
     shift: float
-    """[standard errors], by the pours that teach, or by the few of the search."""
+    """[standard errors], estimated from the training pours, or from the few pours of the search."""
 
 
 @dataclass(frozen=True)
@@ -143,20 +143,22 @@ class Offered(Record):
 
 @dataclass(frozen=True)
 class CalibratedModel(Record):
-    """A calibrated model: parameters in natural units and the amplitudes of the effects that are on."""
+    """A calibrated model: parameters in natural units, and the amplitudes of the effects that act."""
 
     theta: tuple[float, ...]
     effects: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
     @property
     def name(self) -> str:
-        """ "base", or the effects' names."""
+        """``BASE``, or the names of the effects joined by "+"."""
         return "+".join(name for name, _ in self.effects) or BASE
 
 
 @dataclass(frozen=True)
 class RankedExperiment(Record):
-    """chance: of an answer (``next_experiment.py``); separation: least distance of answers [σ of a pour and theirs]."""
+    """``chance``: how often the right answer is given (``next_experiment.py``); ``separation``: smallest distance
+    between the predictions of two answers [standard deviations of a pour and of the predictions].
+    """
 
     name: str
     chance: float
@@ -165,26 +167,26 @@ class RankedExperiment(Record):
 
 @dataclass(frozen=True)
 class Suggestion(Record):
-    """An experiment.
+    """A suggested experiment.
 
     Attributes
     ----------
     experiment
-        What it tells, and with which chance.
+        Its name, its chance of giving the right answer and its separation of the answers.
     values
-        Parameter path → value [SI] of what is set otherwise than in the condition ``condition``.
+        Parameter path → value [SI] of the settings that differ from ``condition``.
     condition
         Name of the fitted condition that it changes.
     rivals
-        Labels of what it is to tell apart, "base" for nothing missing.
+        Labels of the answers to be told apart, "base" for nothing missing.
     levers
-        By their nature: what reveals each of the rivals' effects.
+        For each of the rivals' effects, what reveals it by its nature.
     pours
-        That it asks for; 0 where single bodies alone are measured, to check an answer that is given already.
+        Number of pours asked for; 0 if single bodies alone are measured, to check an answer that is already given.
     turned
         Whether the rig is turned by 180° on its bench.
     bodies
-        Component and quantity of what is to be measured of single bodies beside it (``doe/measurement/bodies.py``).
+        Component and quantity of each number to be measured of single bodies as well (``doe/measurement/bodies.py``).
     """
 
     experiment: RankedExperiment

@@ -1,9 +1,9 @@
-"""At which amplitude an effect is poured: where it shifts the summaries of a data set by about 12 standard errors.
+"""Search for the amplitude at which an effect shifts the summaries of a data set by about 12 standard errors.
 
-From the end of the range inward; back out, halfway on a logarithmic scale, where a step inward went too far. Less only
-where all that the literature supports does less. The pour of a trial and the covariance of the base model's alone tell
-the order of a shift: once all effects have been poured, ``taught_shifts`` tells it by the covariance of all of them,
-and what does too little is poured again farther out.
+The search starts at the end of the range and steps inward; after a step too far it steps back out, halfway on a
+logarithmic scale. The shift is smaller only if the whole range supported by the literature shifts less. A trial pour,
+with the covariance of the base model's pours alone, gives only the order of a shift. Once all effects have been poured,
+``taught_shifts`` uses the covariance of all pours, and an effect that shifts too little is poured again farther out.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from doe.diagnose.result import Level
 FloatArray = npt.NDArray[np.float64]
 
 REPLICATES = 6
-"""Pours of a data set in each condition, by which shifts and strengths are stated."""
+"""Pours per condition of the data set for which shifts and strengths are stated."""
 STRONG = 12.0
-"""Shift [standard errors] that is wanted."""
+"""Target shift [standard errors]."""
 LEAST_STEP = 0.05
-"""An amplitude shrinks by no more than this factor at once: the answer to a strong effect may saturate."""
+"""Smallest factor on an amplitude in one step inward: the response to a strong effect may saturate."""
 
 
 @dataclass(frozen=True)
 class Trials:
-    """How an amplitude is looked for: pours of each, how many are tried at most, and shifts that will do."""
+    """Settings of the search: pours per trial, largest number of trials, and range of shifts that will do."""
 
     pours: int
     most: int
@@ -49,7 +49,7 @@ def level_of(
     points: Callable[[float, int], Sequence[Point]],
     trials: Trials,
 ) -> Search[Level]:
-    """The level of ``direction``; share 1 where all of the range does less. ``points(share, number)``: its pours."""
+    """Find the level of ``direction``; share 1 if the whole range shifts less. ``points(share, number)``: its pours."""
     share, below, above = 1.0, 0.0, math.inf
     level = Level(direction, 1.0, math.inf)
     for _ in range(trials.most):
@@ -72,9 +72,9 @@ def level_of(
 def whitened_shift(declared: Declared, base: Rows, moved: Rows) -> float:
     """Distance of the mean summaries of two sets of pours in standard errors of ``REPLICATES`` pours, all conditions.
 
-    Less what noise alone adds to its square on average. The covariance is that of ``base``, shrunk halfway to its
-    diagonal (they are few). Pours that broke off are left out, and summaries that less than ``READABLE`` of ``base``
-    give. Infinite if a condition has no pour of ``moved`` left.
+    The expected contribution of noise to its square is subtracted. The covariance is that of ``base``, shrunk halfway
+    to its diagonal because these pours are few. Pours that broke off are left out, and so are summaries that less than
+    ``READABLE`` of ``base`` give. Infinite if a condition has no pour of ``moved`` left.
     """
     square = 0.0
     for c in range(len(declared.conditions)):
@@ -95,7 +95,7 @@ def whitened_shift(declared: Declared, base: Rows, moved: Rows) -> float:
 def taught_shifts(lessons: Lessons, ways: Sequence[Way]) -> FloatArray:
     """Shift of the features of ``lessons`` by every way at its reference amplitude, (m,) [standard errors].
 
-    By the pours there, in the covariance of all pours and with what parameters do taken out; less what noise adds.
+    From the pours there, with the covariance of all pours; less the response to parameters and what noise adds.
     """
     taught, _ = usable(lessons, [np.arange(block.shape[1]) for block in lessons.blocks])
     emulator = emulated(taught, ways)
@@ -111,7 +111,7 @@ def taught_shifts(lessons: Lessons, ways: Sequence[Way]) -> FloatArray:
 
 
 def _valid(pours: Rows, condition: int, given: npt.NDArray[np.bool_]) -> FloatArray:
-    """The summaries ``given`` of the pours that have them all."""
+    """The summaries ``given`` of the valid pours that have them all."""
     rows = [np.asarray(row[condition].summaries)[given] for row in pours if row[condition].valid]
     complete = [row for row in rows if np.isfinite(row).all()]
     return np.array(complete).reshape(len(complete), int(given.sum()))

@@ -1,7 +1,7 @@
-"""The pours that teach the models: the base model, every effect at its level, and more of what stays in question.
+"""The training pours: the base model, every effect at its level, and more of what stays in question.
 
-Measured values come in only in the choice of what is poured more, and at which multiple of its level (a power of two,
-so that data sets of one model ask for the same pours); all pours belong to the declared model.
+Measured values only decide which further pours are made, and at which multiple of a level (a power of two, so that data
+sets of one model ask for the same pours). All pours belong to the declared model.
 """
 
 from __future__ import annotations
@@ -43,32 +43,34 @@ FloatArray = npt.NDArray[np.float64]
 Say = Callable[[str], None]
 
 TRIALS = Trials(pours=1, most=5, enough=6.0, too_much=18.0)
-"""One pour tells the order of a shift, and all pours of an effect whether it is enough."""
+"""One pour gives the order of a shift, and all pours of an effect show whether it is enough."""
 RAISES = 3
-"""Times at most that an effect is poured farther out, whose pours together shift by less than is enough."""
+"""How often, at most, an effect is poured farther out because its pours together shift too little."""
 TOLD = 4.0
-"""Shift that four pours tell from none: farther out by no more than that has to grow to ``STRONG``."""
+"""Shift that four pours can tell from none: a smaller one is replaced by it when the amplitude is raised to
+``STRONG``."""
 ENDED = 0.75
-"""Share of pours that have to come to a valid end where an effect is poured farther out."""
+"""Fraction of pours that must come to a valid end where an effect is poured farther out."""
 NEAR = (0.2, 2.5)
-"""Multiples of a level at which the pours of its search teach: a parabola follows no answer farther."""
+"""Multiples of a level between which pours of its search are used for training: a parabola describes no wider range."""
 SHIFTED = 12
-"""Pours of the base model that are looked at from elsewhere, for a displaced funnel."""
+"""Number of the base model's pours that are viewed displaced, for a displaced funnel."""
 IN_QUESTION = 0.03
-"""Probability of an effect from which on it is in question."""
+"""Probability above which an effect is in question."""
 FURTHER, FOLLOWED = 5.0, 3
-"""Log evidence over the base model's from which on an effect is followed further whose best fit is at the end of what
-was poured, and how many of these at once: what is strong looks like nothing that was poured."""
+"""Log evidence over the base model's above which an effect is followed further if its best fit is at the end of what
+was poured, and largest number of these at once: data of a strong effect resemble nothing that was poured."""
 LIMIT, FAR = 1.5, 2.5
-"""Deviations of a parameter at the base model's best fit from which on it is poured farther off, and how far: a bent
-answer, continued straight from one deviation, looks like an effect (root 2, set 3: restitution at 2.8)."""
+"""Deviation of a parameter from its mean at the base model's best fit above which it is poured farther off, and how far
+[deviations]. A nonlinear response, continued straight from one deviation, looks like an effect (root 2, set 3:
+restitution at 2.8)."""
 BEHIND = 4.0
-"""Log evidence by which a direction may be behind the best one of its effect and be in question with it."""
+"""Log evidence by which a direction may trail the best one of its effect and still be in question with it."""
 
 
 @dataclass(frozen=True)
 class Probe:
-    """A pour that teaches: of way ``way`` at a multiple of its level, or of the base model (−1, 0)."""
+    """A training pour: of way ``way`` at a multiple of its level, or of the base model (−1, 0)."""
 
     point: Point
     way: int
@@ -76,12 +78,12 @@ class Probe:
 
 
 class TrainingPours:
-    """Pours what teaches the models of a declared scene in the set-ups of ``conditions``.
+    """Makes the training pours of a declared scene in the set-ups of ``conditions``.
 
-    ``declared`` holds the first of these, or all: amplitudes are found by what they do in them, so that a condition
-    that comes later changes nothing of what was poured in the others.
+    ``declared`` holds the first of these, or all. Amplitudes are chosen by the shifts in the conditions that it holds,
+    so a condition added later does not change what was poured in the others.
 
-    Raises StatisticsError where the base model comes to no valid end.
+    Raises StatisticsError if too few pours of the base model come to a valid end.
     """
 
     def __init__(
@@ -94,7 +96,7 @@ class TrainingPours:
         self._rows: dict[Point, list[PointPour]] = {}
         self._tried: list[tuple[Direction, float, list[Point]]] = []
         self._directions = [one for effect in declared.effects for one in directions_of(effect)]
-        # A direction that is calibrated is another one in every pour of the base model.
+        # A calibrated direction differs between the pours of the base model.
         self._turned = all(unchanged_by_a_quarter_turn(condition.scene) for condition in conditions) and not any(
             len(EFFECTS[name].amplitudes) > 1 for p in declared.parameters if (name := effect_of(p.name))
         )
@@ -127,7 +129,7 @@ class TrainingPours:
 
     @property
     def ways(self) -> tuple[Way, ...]:
-        """Directions of effects at their levels."""
+        """Directions of effects, with their levels as reference amplitudes."""
         return tuple(
             Way(one.effect, one.name, one.at(level.share), 1.0 / level.share, one.angle)
             for one, level in zip(self._directions, self._levels, strict=True)
@@ -140,7 +142,7 @@ class TrainingPours:
 
     @property
     def settings(self) -> int:
-        """Settings poured so far."""
+        """Number of settings poured so far."""
         return len({point.seen(AS_IT_IS) for point in self._rows})
 
     @property
@@ -150,15 +152,15 @@ class TrainingPours:
 
     @property
     def pours(self) -> tuple[int, ...]:
-        """Pours that taught each way."""
+        """Number of training pours of each way."""
         ways = [way for way, _ in self._acting.values()]
         return tuple(ways.count(way) for way in range(len(self._levels)))
 
     def look(self, found: Posterior) -> tuple[str, ...]:
-        """Pour more of what ``found`` leaves in question, near its best fits; the effects that were poured.
+        """Pour more of what ``found`` leaves in question, near its best fits; return the effects that were poured.
 
-        And of the base model: all models begin with it, and where it is less well known than they are, data without an
-        effect agree with them better by the noise of its pours.
+        More of the base model is poured as well, because all models build on it: if it were known less well than they
+        are, data without an effect would agree better with them, by the noise of its pours.
         """
         further = self.at_end(found)
         wanted = [(way, multiple, self._budget.screening) for way, multiple in further]
@@ -177,7 +179,7 @@ class TrainingPours:
         return tuple(dict.fromkeys(self.ways[way].effect for way, _, _ in wanted))
 
     def refine(self, found: Posterior, label: str) -> None:
-        """Pour the effects of ``label`` on both sides of their best fits, so that these are no extrapolation."""
+        """Pour the effects of ``label`` on both sides of their best fits, so that these are no extrapolations."""
         wanted = []
         for name in label.split("+"):
             level = max(
@@ -190,12 +192,12 @@ class TrainingPours:
         self._pour("refinement", wanted)
 
     def lessons(self) -> Lessons:
-        """All pours, NaN where one broke off or a feature could not be read."""
+        """All pours; NaN where one broke off or a feature could not be read."""
         probes = [Probe(point, *self._acting[point]) for point in self._rows]
         return self.told(probes, list(self._rows.values()))
 
     def instruments(self, conditions: Sequence[MeasuredFeatures]) -> list[Instrument]:
-        """By condition what its scanner does to the base model's pours; empty where every sight and axis is perfect."""
+        """Shift by each condition's scanner in the base model's pours; empty if every sight and axis is perfect."""
         if all(one.sight == PERFECT and one.axis_error == 0.0 for one in conditions):
             return []
         return [
@@ -204,16 +206,16 @@ class TrainingPours:
         ]
 
     def axis_in(self, pours: ModelPours, c: int, scalars: int, error: float) -> FloatArray:
-        """What a scan's axis that is ``error`` [m] off along x and y does in condition ``c`` of ``pours``, (2, d)."""
+        """Shift in condition ``c`` of ``pours`` if a scan's axis is ``error`` [m] off along x and along y, (2, d)."""
         return _instrument(self.declared, pours, c, scalars, error).axis
 
     def probes(self, found: Posterior, labels: Sequence[str], number: int) -> list[Probe]:
-        """``number`` pours of each effect of ``labels``, as they teach it, near its best fit in ``found``."""
+        """``number`` pours of each effect of ``labels``, as in training, near its best fit in ``found``."""
         wanted: dict[tuple[int, float], None] = {}
         for label in labels:
             for way, multiple in acting(found, label, self.ways):
                 nearest = min(2.0 ** round(math.log2(multiple)), self.ways[way].most)
-                # One that is poured in all directions of the plane needs them all.
+                # An effect that is poured in all directions of the plane needs them all.
                 same = self._all_of(way) if self.ways[way].angle is not None else [way]
                 wanted |= {(one, nearest): None for one in same}
         return [
@@ -229,11 +231,11 @@ class TrainingPours:
         )
 
     def base(self, number: int) -> list[Probe]:
-        """``number`` pours of the base model, as they teach it."""
+        """``number`` pours of the base model, as in training."""
         return [Probe(point, -1, 0.0) for point in base_points(self.declared, number)]
 
     def told(self, probes: Sequence[Probe], rows: Sequence[Sequence[PointPour]]) -> Lessons:
-        """What pours of ``probes``, one per condition each, teach; NaN where one broke off or could not be read."""
+        """Training data from pours of ``probes``, one per condition; NaN where one broke off or could not be read."""
         blocks = []
         for pours in zip(*rows, strict=True):
             block = np.array([(*pour.summaries, *pour.surface) for pour in pours], dtype=np.float64)
@@ -248,7 +250,7 @@ class TrainingPours:
         )
 
     def _found_levels(self) -> list[Level]:
-        """The level of every direction; one for all directions in the plane."""
+        """Find the level of every direction; all directions in the plane share one."""
         asked = [one for one in self._directions if not one.angle]
 
         def tried(direction: Direction, share: float, number: int) -> list[Point]:
@@ -258,7 +260,7 @@ class TrainingPours:
 
         def search(one: Direction) -> Search[Level]:
             level = yield from level_of(self.declared, one, self._base, partial(tried, one), TRIALS)
-            # What screening will ask for, while others are still searched.
+            # Start the screening pours of this direction while others are still searched.
             yield self._points(one, level.share, self._budget.screening)
             return level
 
@@ -274,7 +276,7 @@ class TrainingPours:
         return levels
 
     def _tell_shifts(self) -> None:
-        """The shifts of the levels in the scalars, by all pours so far."""
+        """Compute from all pours so far how much each level shifts the scalars."""
         first = len(self.declared.conditions)
         scalars = [np.arange(len(summary_names(condition))) for condition in self._conditions[:first]]
         lessons = self.lessons()
@@ -282,9 +284,9 @@ class TrainingPours:
         self._levels = [replace(one, shift=float(shift)) for one, shift in zip(self._levels, shifts, strict=True)]
 
     def _raise_levels(self, refused: dict[int, float]) -> bool:
-        """Pour farther out what shifts the scalars too little; whether there was any.
+        """Pour an effect farther out if it shifts the scalars too little; return whether there was any.
 
-        ``refused``: by way the least share at which pours broke off.
+        ``refused``: by way, the least share at which pours broke off.
         """
         first = len(self.declared.conditions)
         asked: dict[int, tuple[float, list[Point]]] = {}
@@ -309,7 +311,7 @@ class TrainingPours:
         return bool(asked)
 
     def _keep_trials(self) -> None:
-        """Pours by which a level was found teach as well, where they are not too far from it."""
+        """Use the pours of the search for a level in training if they are not too far from it."""
         for direction, share, points in self._tried:
             way = self._directions.index(direction)
             multiple = share / self._levels[way].share
@@ -317,7 +319,7 @@ class TrainingPours:
                 self._keep(points, self._pours.run("amplitudes", points), way, multiple)
 
     def _points(self, direction: Direction, share: float, number: int) -> list[Point]:
-        """Pours of ``direction`` at ``share`` of its range, by whatever stands in for them."""
+        """Pours of ``direction`` at ``share`` of its range, or views of other pours that stand in for them."""
         if direction.angle is not None and direction.effect == "funnel_offset" and self._heaps:
             dx, dy = direction.at(share)
             return [one.seen(View(shift=(dx, dy))) for one in base_points(self.declared, max(number, SHIFTED))]
@@ -328,9 +330,9 @@ class TrainingPours:
         return effect_points(self.declared, direction, share, number)
 
     def _pour(self, what: str, wanted: Iterable[tuple[int, float, int]], base: Sequence[Point] = ()) -> None:
-        """Pour ways at multiples of their levels up to so many of each, of a planar effect in all its directions.
+        """Pour ways at multiples of their levels, up to a number of each; an effect in the plane in all its directions.
 
-        And ``base``, of the base model: all at once, so that no core waits for the last pour of one of them.
+        ``base``: points of the base model. All are run together, so that no core idles at the end of one group.
         """
         asked: list[tuple[int, float, Sequence[Point]]] = [(-1, 0.0, base)]
         for way, multiple, number in wanted:
@@ -344,7 +346,7 @@ class TrainingPours:
             self._keep(points, self._pours.run(what, points), way, multiple)
 
     def _all_of(self, way: int) -> list[int]:
-        """Ways of the effect of ``way``."""
+        """Indices of all ways of the effect of ``way``."""
         effect = self._directions[way].effect
         return [number for number, one in enumerate(self._directions) if one.effect == effect]
 
@@ -356,7 +358,7 @@ class TrainingPours:
         return sum(one == (way, multiple) for one in self._acting.values())
 
     def _in_question(self, found: Posterior) -> list[tuple[int, float]]:
-        """Ways, with a multiple at which they are poured beside their best fit."""
+        """Ways in question, each with a multiple at which it is poured near its best fit."""
         probability: dict[str, float] = {}
         for label, p in found.effects.items():
             for name in label.split("+"):
@@ -370,15 +372,15 @@ class TrainingPours:
             way = self.ways[level.way]
             if probability[way.effect] > IN_QUESTION and level.log_density > best[way.effect] - BEHIND:
                 asked.append((level.way, self._beside(level.way, level.amplitude)))
-        # Beside another effect it may fit best elsewhere than alone.
+        # With another effect, its best amplitude may differ from that alone.
         pairs = [label for label, p in found.effects.items() if "+" in label and p > IN_QUESTION]
         paired = [one for label in pairs for one in acting(found, label, self.ways)]
         asked += [(way, self._beside(way, amplitude)) for way, amplitude in paired]
         return list(dict.fromkeys(asked))
 
     def _beside(self, way: int, amplitude: float) -> float:
-        """The power of two of a level that is nearest to ``amplitude``, or the one on its other side once that has been
-        poured: known well on one side only, a model pays for what it does not know on the other.
+        """The power of two of a level nearest to ``amplitude``, or the one on its other side once the nearest has been
+        poured: a model that is well known on one side only loses evidence by its uncertainty on the other.
         """
         power = math.log2(amplitude)
         sides = sorted((math.floor(power), math.ceil(power)), key=lambda one: abs(one - power))
@@ -386,7 +388,7 @@ class TrainingPours:
         return next((one for one in multiples if self._taught(way, one) < self._budget.more), multiples[0])
 
     def at_end(self, found: Posterior) -> list[tuple[int, float]]:
-        """Ways whose best fit is the largest amplitude that the models reach, with a larger one that there can be."""
+        """Ways whose best fit is the largest amplitude that the models reach, each with a larger possible one."""
         base = found.fits["base"].log_evidence
         ends = []
         for level in sorted(found.levels, key=lambda one: -one.log_density):
@@ -398,8 +400,8 @@ class TrainingPours:
 
 
 def acting(found: Posterior, label: str, ways: Sequence[Way]) -> list[tuple[int, float]]:
-    """Ways and multiples of their reference amplitudes at which the effects of ``label`` fit best; of an effect with a
-    direction in the plane its first way, whatever its direction. None of "base".
+    """Ways and multiples of their reference amplitudes at which the effects of ``label`` fit best; none for "base". An
+    effect with a direction in the plane is given by its first way, whatever its direction.
     """
     places = []
     for name in label.split("+"):
@@ -409,7 +411,7 @@ def acting(found: Posterior, label: str, ways: Sequence[Way]) -> list[tuple[int,
         best = max(own, key=lambda one: one.log_density)
         way, amplitude = best.way, best.amplitude
         if "+" in label:
-            # Beside another effect it may be of another size and sign.
+            # With another effect, its amplitude and sign may differ.
             values = [one.value for one in found.fits[label].amplitudes if one.effect == name]
             way = next((one.way for one in own if ways[one.way].unit[0] * values[0] > 0.0), way)
             amplitude = max(LEAST, math.hypot(*values) / math.hypot(*ways[way].unit))
@@ -420,14 +422,14 @@ def acting(found: Posterior, label: str, ways: Sequence[Way]) -> list[tuple[int,
 def _instrument(
     declared: Declared, pours: ModelPours, c: int, scalars: int, axis_error: float, sight: Sight = PERFECT
 ) -> Instrument:
-    """What a scanner does to the base model's pours in condition ``c`` of ``pours``; not to the ``scalars``."""
+    """Shift by a scanner in the base model's pours in condition ``c`` of ``pours``; none in the ``scalars``."""
     points = base_points(declared, SHIFTED)
     shifts = ((axis_error, 0.0), (0.0, axis_error))
     views = [AS_IT_IS, View(sight=sight), *(View(shift=shift) for shift in shifts)]
     seen = pours.run("scanner", [p.seen(v) for v in views for p in points], [c])
     rows = np.array([(*row.summaries, *row.surface) for (row,) in seen]).reshape(len(views), len(points), -1)
     change = rows[1:] - rows[0]
-    # Numbers of the table come from other instruments.
+    # Scalars in the table come from other instruments.
     change[:, :, :scalars] = 0.0
     ended = np.isfinite(change).all(axis=(0, 2))
     bias, *axis = change[:, ended].mean(axis=1)

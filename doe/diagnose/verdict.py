@@ -1,14 +1,14 @@
-"""The answer: two rules on the posterior, and everything that led to it, as plain records.
+"""The answer by two rules on the posterior, and everything that led to it, as plain records.
 
 kind: ``no_missing_effect``, ``effect:<name>``, ``effects:<a>+<b>``, ``unexplained``, or ``ambiguous:<a>,<b>,…`` with
-all that is still possible, which may be ``no_missing_effect`` and ``unexplained`` among them.
+all answers that are still possible, which may include ``no_missing_effect`` and ``unexplained``.
 
-    something is named     if it is the most probable effect or pair, with a probability of ``THRESHOLD`` at least
-                           (after a follow-up, which could not tell what is beside it: alone or with others), and the
-                           data are likely under it (``FITS``), and the declared model is in doubt (``DOUBTED``)
-    no_missing_effect      if its probability is ``NOTHING_AT_ONCE`` at least, ``NOTHING_FROM`` after a follow-up
-    unexplained            if something outside the library is the most probable, or no model that is left fits
-    ambiguous              else: the smallest set that holds ``CREDIBLE``
+    something is named     if it is the most probable effect or pair, its probability is at least ``THRESHOLD``
+                           (after a follow-up, which cannot tell what acts with it: alone or with others), the data
+                           are likely under it (``FITS``), and the declared model is in doubt (``DOUBTED``)
+    no_missing_effect      if its probability is at least ``NOTHING_AT_ONCE``, or ``NOTHING_FROM`` after a follow-up
+    unexplained            if something outside the library is the most probable, or no remaining model fits
+    ambiguous              otherwise: the smallest set that holds ``CREDIBLE``
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ from doe.record import Record
 FloatArray = npt.NDArray[np.float64]
 
 THRESHOLD = 0.9
-"""Probability from which on an effect is named: one of the two numbers tuned on development sets."""
+"""Probability from which an effect is named: one of the two numbers tuned on development sets."""
 NOTHING_AT_ONCE, NOTHING_FROM = 0.7, 0.6
-"""Probability that nothing is missing from which on that is the answer, before and after a follow-up: somewhat more
-than before the data, for those that leave it where it was do not speak for it. With 0.6 at once five of 29 effects and
-pairs were missed at 0.60 to 0.66, and half of the sets without an effect are above 0.74 (root 1, ``docs/limit.md``)."""
+"""Probability from which "nothing missing" is the answer, before and after a follow-up: somewhat above the prior, since
+data that leave the prior as it was do not support it. With 0.6 before a follow-up five of 29 effects and pairs were
+missed at 0.60 to 0.66, and half of the sets without an effect are above 0.74 (root 1, ``docs/limit.md``)."""
 DOUBTED = 0.1
-"""Probability of data as far off the declared model below which an effect may be named. Of 43 names (roots 1 and 2) it
-was 0.02 at most, but 0.65 of the one where nothing was missing: a parameter far off its mean looked like an effect. As
-many features hide what is off in a few (0.9 and 0.15 of two effects by scans of root 3, at odds of 10⁵), a name
-also stands if it would were the declared model's parameters measured where it wants them (:func:`in_doubt`)."""
+"""Probability of data as far off the declared model below which an effect may be named. For 43 names (roots 1 and 2) it
+was 0.02 at most, but 0.65 for the one where nothing was missing: a parameter far off its mean looked like an effect.
+Many features can hide a misfit in a few (0.9 and 0.15 for two effects by scans of root 3, at odds of 10⁵). So a name
+also stands if it would with the declared model's parameters measured at their best fit (:func:`in_doubt`)."""
 CREDIBLE = 0.95
-"""Probability of the set of an ambiguous answer."""
+"""Probability that the set of an ambiguous answer holds."""
 MOST_PAIRS = 5
-"""Pairs in the table."""
+"""Largest number of pairs in the table."""
 
 
 @dataclass(frozen=True)
@@ -52,26 +52,26 @@ class Verdict(Record):
     Attributes
     ----------
     kind, names, statement
-        See above; ``names``: the effects (or pairs) in it, the most probable first.
+        See above; ``names``: the effects (or pairs) in the answer, the most probable first.
     nothing, outside
         Probabilities that nothing is missing and that something outside the library is.
     effects
-        Effects, and pairs where they were weighed, the most probable first.
+        Effects, and pairs if they were weighed, the most probable first.
     parameters, residuals, where
-        Of the calibrated base model and the final one: what is named, or else the most probable effect if it is in the
-        answer, or else the base model.
+        For the calibrated base model and the final one: the named effect, or else the most probable effect if it is in
+        the answer, or else the base model.
     final
         Label of the final model.
     similar
         Pairs of effects whose best fits shift the data alike: names and cosine, the most alike first.
     left_out
-        What the data offer and no pour varies or gives.
+        Features that the data offer and no pour varies or gives.
     scatter
         Variance of the measured replicates over that of simulated pours.
     threshold, temperature
         The numbers of the rule.
     taken_back
-        The answer that held-out data took back, or "".
+        The answer that held-out data withdrew, or "".
     """
 
     kind: str
@@ -93,7 +93,7 @@ class Verdict(Record):
 
 
 def answer(found: Posterior, followed_up: bool) -> tuple[str, tuple[str, ...], str]:
-    """Kind, names and sentence for a posterior."""
+    """Kind, names and statement for a posterior."""
     name, sure = candidate(found, followed_up)
     p, doubted = found.effects.get(name, 0.0), in_doubt(found, sure)
     if doubted and sure >= THRESHOLD and found.fits[name].p >= FITS:
@@ -126,14 +126,14 @@ def answer(found: Posterior, followed_up: bool) -> tuple[str, tuple[str, ...], s
 
 
 def read_in(found: Posterior) -> list[str]:
-    """Models whose fits an answer or its table may name."""
+    """Labels of the models whose fits an answer or its table may use."""
     singles = [label for label in found.effects if "+" not in label]
     pairs = [label for label in _credible(_everything(found)) if "+" in label]
     return list(dict.fromkeys(["base", *singles, *pairs, *_likely_pairs(found)]))
 
 
 def _everything(found: Posterior) -> dict[str, float]:
-    """All answers with their probabilities."""
+    """Probability of every answer."""
     return {**found.effects, NO_EFFECT: found.nothing, UNEXPLAINED: found.outside}
 
 
@@ -149,7 +149,7 @@ def _likely_pairs(found: Posterior) -> list[str]:
 
 
 def in_doubt(found: Posterior, sure: float) -> bool:
-    """Whether what has the probability ``sure`` may be named: see ``DOUBTED``. Parameters θ cost exp(−½ θᵀθ)."""
+    """Whether an answer of probability ``sure`` may be named: see ``DOUBTED``. Parameters θ cost exp(−½ θᵀθ)."""
     base = found.fits["base"]
     if base.p < DOUBTED:
         return True
@@ -158,7 +158,7 @@ def in_doubt(found: Posterior, sure: float) -> bool:
 
 
 def candidate(found: Posterior, followed_up: bool) -> tuple[str, float]:
-    """The most probable effect or pair, "" for none, and the probability by which it may be named."""
+    """The most probable effect or pair, "" for none, and the probability that decides whether it is named."""
     name, p = found.best if found.effects else ("", 0.0)
     return name, found.missing(name) if followed_up else p
 
@@ -169,7 +169,7 @@ def listed(names: Sequence[str]) -> str:
 
 
 def verdict_of(compared: Compared, declared: Declared, pours: Sequence[int], followed_up: bool) -> Verdict:
-    """The verdict with its tables. ``pours``: that taught each way; ``followed_up``: whether nothing can be asked."""
+    """The verdict with its tables. ``pours``: that trained each way; ``followed_up``: whether no more can be asked."""
     found = compared.posterior
     kind, names, statement = answer(found, followed_up)
     final = names[0] if names else "base"
@@ -196,13 +196,13 @@ def verdict_of(compared: Compared, declared: Declared, pours: Sequence[int], fol
 
 
 def taken_back(verdict: Verdict, why: str) -> Verdict:
-    """The verdict once held-out data contradict it."""
+    """``verdict`` withdrawn because held-out data contradict it, for the reason ``why``."""
     statement = f"The fitted data say: {verdict.statement} The held-out data contradict it: {why}."
     return replace(verdict, kind=UNEXPLAINED, names=(), statement=statement, taken_back=verdict.kind)
 
 
 class _Recalibrated:
-    """Shifts of z in standard errors of the data, with what recalibration can do taken out."""
+    """Shifts of z in standard errors of the data, less what recalibration can explain."""
 
     def __init__(self, compared: Compared) -> None:
         data, emulator = compared.data, compared.emulator
@@ -282,7 +282,7 @@ def _residuals(compared: Compared, before: Fit, after: Fit) -> tuple[Residual, .
 
 
 def _places(compared: Compared) -> tuple[Place, ...]:
-    """Shares by condition: of the residual of the features as they are, whitened within the condition."""
+    """Each condition's share of the base model's squared residuals ``z_before``, the largest first."""
     rows = _residuals(compared, compared.posterior.fits["base"], compared.posterior.fits["base"])
     whole, found = sum(row.z_before**2 for row in rows) or 1.0, []
     for condition in compared.conditions:
