@@ -266,8 +266,10 @@ def _residuals(compared: Compared, before: Fit, after: Fit) -> tuple[Residual, .
     measured = emulator.features(data.z)
     columns = []
     for fit in (before, after):
-        noise = np.diag(fit.variance) + data.instrument @ data.instrument.T
-        spread = noise + fit.slopes @ fit.theta_covariance @ fit.slopes.T
+        # What the parameters follow is not left: with θ ~ N(0, I), z − ẑ = (I − J C Jᵀ N⁻¹)(z − m) for N = diag(variance).
+        left = np.eye(len(data.z)) - fit.slopes @ fit.theta_covariance @ (fit.slopes / fit.variance[:, None]).T
+        whole = np.diag(fit.variance) + fit.slopes @ fit.slopes.T + data.instrument @ data.instrument.T
+        spread = left @ whole @ left.T
         sigma = np.sqrt(np.einsum("ij,jk,ik->i", inverse, spread, inverse, optimize=True))
         columns.append((emulator.features(fit.z), inverse @ (data.z - fit.z) / sigma))
     conditions = zip(compared.conditions, compared.names, strict=True)

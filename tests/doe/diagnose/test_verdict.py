@@ -169,6 +169,8 @@ def test_the_tables_of_a_verdict_by_closed_form():
     residuals = {one.feature: one for one in found.residuals}
     assert residuals["lean"].z_before == pytest.approx(2.0 * np.arcsinh(1.5) / np.sqrt(noise), rel=0.2)
     assert residuals["lean"].measured - residuals["lean"].before == pytest.approx(3.0, rel=0.2)
+    # All that is known of the parameter is this feature, which it follows: what is left is as unlikely as the whole.
+    assert residuals["width"].z_before == pytest.approx(2.0 * np.arcsinh(1.0) / np.sqrt(1.0 + noise), rel=0.1)
     assert abs(residuals["area"].z_before) < 1.0
     (place,) = found.where
     assert (place.condition, place.share, place.feature) == ("low", 1.0, "lean")
