@@ -1,7 +1,7 @@
-"""Sum a density over a grid of two sizes that is fine only where the density needs it.
+"""Sum a density over a two-dimensional grid that is refined only where the density needs it.
 
-Neighbouring nodes along either axis make a cell, which is summed by its middle. Where the density may change too much
-across a cell and is not negligible, the cell is parted into three by three, down to single nodes.
+A cell covers neighbouring nodes along both axes; its middle node stands for it in the sum. Where the density may change
+too much across a cell and is not negligible, the cell is split into three by three, down to single nodes.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ FloatArray = npt.NDArray[np.float64]
 Places = npt.NDArray[np.int64]
 
 CELL, PARTS = 9, 3
-"""Nodes along an axis in a first cell, and parts of a cell along either axis."""
+"""Nodes of an initial cell along each axis, and parts into which a cell is split along each axis."""
 SMOOTH = 3.0
-"""Change across a cell up to which its middle stands for it [standard deviations of the density]: Gaussian terms that
-are as far apart add up to within 0.23 of their integral (Poisson's summation formula, 2 exp(−2π²/9))."""
+"""Largest change across a cell for which its middle may stand for it [standard deviations of the density]: a sum of
+Gaussian terms with this spacing is within 0.23 of its integral (Poisson's summation formula, 2 exp(−2π²/9))."""
 NEGLIGIBLE = 10.0
-"""Log density below the largest from which on nothing matters."""
+"""Drop of the log density below its largest value beyond which a cell is negligible."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +32,11 @@ class Cells:
     Attributes
     ----------
     first, second
-        Nodes in their middles, (n,).
+        Indices of their middle nodes along the two axes, (n,).
     share
-        Log of the share of the counted nodes that each holds, (n,).
+        Log of the share of the counted nodes in each cell, (n,).
     logs
-        Log density in their middles, (n,).
+        Log density at their middle nodes, (n,).
     """
 
     first: Places
@@ -51,19 +51,21 @@ def parted_cells(
     counted: Sequence[npt.NDArray[np.bool_]],
     floor: float = -math.inf,
 ) -> Cells:
-    """Cells that are small enough for ``density``; the largest is in a cell of one node.
+    """Cells small enough for ``density``; its largest value is in a cell of one node.
 
     Parameters
     ----------
     density
-        Log density (n,) at nodes (n,) of both axes, for cells of so many nodes along either.
+        Returns the log density (n,) at nodes (n,), (n,) of the two axes, given the number of nodes of a cell along
+        each axis.
     changes
-        By how many of its standard deviations the density changes from each node of an axis to the next. An axis has a
-        whole number of cells; from one of these to the next it may go back.
+        Change of the density from each node of an axis to the next [its standard deviations]. An axis holds a whole
+        number of initial cells; from one cell to the next its values may jump back.
     counted
-        Which nodes of each axis are summed at all; at least one.
+        Which nodes of each axis enter the sum; at least one.
     floor
-        Log density up to which nothing matters, for something else is as large: no cell is parted below it.
+        Log density up to which nothing matters, because something else is as large: it counts as the largest value
+        found so far.
     """
     before = [np.concatenate([[0], np.cumsum(some)]) for some in counted]
     every, size, largest = before[0][-1] * before[1][-1], CELL, floor
@@ -76,7 +78,7 @@ def parted_cells(
         logs = density(i, j, size)
         largest = max(largest, float(logs.max()))
         across = size * np.stack([changes[0][i], changes[1][j]])
-        # A Gaussian's √(2 (largest − log)) may be less by half of this elsewhere in the cell.
+        # Elsewhere in the cell a Gaussian's √(2 (largest − log)) may be smaller by half the length of ``across``.
         reach = math.sqrt(2.0 * NEGLIGIBLE) + 0.5 * np.linalg.norm(across, axis=0)
         parted = (logs > largest - 0.5 * reach**2) & ((across.max(axis=0) > SMOOTH) | (logs == largest)) & (size > 1)
         found.append(tuple(one[~parted] for one in (i, j, np.log(held / every), logs)))

@@ -1,5 +1,5 @@
-"""The covariance of observations in groups, shrunk, with what covariates do taken out; the density of data under one
-that few observations have told; means of few observations, shrunk.
+"""Shrunk covariance of grouped observations, with the effects of covariates removed; density of data under a covariance
+that is estimated from few observations; shrunk means of few observations.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ FloatArray = npt.NDArray[np.float64]
 Groups = npt.NDArray[np.int64]
 
 OUTLIER = 0.01
-"""Probability of an observation as far off as an outlier."""
+"""Probability of an observation at least as far off as an outlier."""
 ROUNDS = 20
-"""In which the weights of outliers settle."""
+"""Iterations in which the weights of outliers settle."""
 
 
 def shrunk_covariance(residuals: FloatArray) -> FloatArray:
-    """Covariance of the rows (n, d), correlations shrunk to zero by λ* = Σ Var(r_ij) / Σ r_ij² over i ≠ j.
+    """Covariance (d, d) of the rows (n, d), correlations shrunk to zero by λ* = Σ Var(r_ij) / Σ r_ij² over i ≠ j.
 
     Schäfer & Strimmer 2005, doi 10.2202/1544-6115.1175.
     """
@@ -37,13 +37,13 @@ def shrunk_covariance(residuals: FloatArray) -> FloatArray:
 
 
 def pooled_slopes(values: FloatArray, group: Groups, covariates: FloatArray) -> FloatArray:
-    """What ``covariates`` (n, k) do to ``values`` (n, d) within groups, (k, d), by least squares."""
+    """Least-squares slopes (k, d) of ``values`` (n, d) on ``covariates`` (n, k) within groups."""
     inside, moved = _within(values, group), _within(covariates, group)
     return np.asarray(np.linalg.lstsq(moved, inside, rcond=None)[0], dtype=np.float64)
 
 
 def residuals_within(values: FloatArray, group: Groups, covariates: FloatArray) -> FloatArray:
-    """Scatter within groups, less what ``covariates`` do, of the rows that are not alone in theirs."""
+    """Deviations from the group means, less the effect of ``covariates``, of the rows in groups of two or more."""
     left = _within(values, group) - _within(covariates, group) @ pooled_slopes(values, group, covariates)
     count = np.bincount(group)[group].astype(np.float64)
     several = count > 1
@@ -52,7 +52,7 @@ def residuals_within(values: FloatArray, group: Groups, covariates: FloatArray) 
 
 
 def log_t(d: FloatArray, variance: FloatArray, loadings: FloatArray, freedom: int) -> FloatArray:
-    """Log densities (n,) at ``d`` (n, D), but for what depends on D and ν = ``freedom`` alone (Woodbury identity).
+    """Log densities (n,) at ``d`` (n, D), without the terms in D and ν = ``freedom`` alone (by Woodbury's identity).
 
     −½ ln|S| − ½ (ν + 1) ln(1 + dᵀ S⁻¹ d/ν),  S = diag(``variance``, (n, D)) + L Lᵀ,  L = ``loadings`` (n, D, k).
     """
@@ -70,29 +70,29 @@ def scatter_between(
     freedom: int,
     weights: Sequence[FloatArray] | None = None,
 ) -> tuple[list[FloatArray], float]:
-    """Squared distances of whitened observations from their mean, and their variance over what is expected, 1 at least.
+    """Squared distances of whitened observations from their mean, and their variance over its expectation, at least 1.
 
     Parameters
     ----------
     blocks
-        Of some groups, on any axes, (n, D).
+        Whitened observations of each group, on any axes, (n, D).
     features
-        d, of each group.
+        Number of features d of each group.
     freedom
-        ν, degrees of freedom of the covariance that whitened them: other observations look wider by ν/(ν − d − 1).
+        ν, degrees of freedom of the covariance that whitened them: new observations look wider by ν/(ν − d − 1).
     weights
-        Of the observations in their mean, (n,) each; by default the same.
+        Weights of the observations in the mean of their group, (n,) each; equal by default.
 
     Returns
     -------
-    By group, (n,), each of distribution χ²_d, and the ratio over all of them.
+    Squared distances by group, (n,), each distributed as χ²_d, and the ratio of variances over all groups.
     """
     weights = [np.ones(len(z)) for z in blocks] if weights is None else weights
     squares, total, expected = [], 0.0, 0.0
     for z, d, some in zip(blocks, features, weights, strict=True):
         n = len(z)
         slack = freedom / max(0.5 * freedom, freedom - d - 1.0)
-        # An observation is nearer to a mean that it is part of.
+        # An observation is closer to a mean that includes it.
         squares.append(((z - np.average(z, axis=0, weights=some)) ** 2).sum(axis=1) / slack * n / max(1, n - 1))
         total += float(some @ squares[-1]) * (n - 1) / n
         expected += (n - 1) * d
@@ -102,11 +102,11 @@ def scatter_between(
 def outlier_weights(
     blocks: Sequence[FloatArray], features: Sequence[int], freedom: int
 ) -> tuple[list[FloatArray], float]:
-    """Weights (n,) of whitened observations, in groups, in their mean, and what is left of their scatter.
+    """Weights (n,) of whitened observations in the mean of their group, and the ratio of variances that remains.
 
-    min(1, χ²_d(1 − ``OUTLIER``) r/q), as Huber weighs scatter (1981, Robust Statistics, ch. 8): what is farther off
-    than one in a hundred is of as much more variance as puts it there, and weighs by the inverse of that. Parameters as
-    in :func:`scatter_between`.
+    min(1, χ²_d(1 − ``OUTLIER``) r/q), with squared distance q and ratio r, as Huber weighs scatter (1981, Robust
+    Statistics, ch. 8): an observation farther off than one in a hundred is taken to have the larger variance that puts
+    it at that limit, and is weighted by the inverse of the increase. Parameters as in :func:`scatter_between`.
     """
     weights, scatter = [np.ones(len(z)) for z in blocks], 1.0
     farthest = stats.chi2.isf(OUTLIER, features)
@@ -124,23 +124,23 @@ def _within(values: FloatArray, group: Groups) -> FloatArray:
 
 
 def shrunk_means(means: FloatArray, noise: FloatArray, weights: FloatArray) -> FloatArray:
-    """Return ``means`` drawn together by what their errors alone would set between them.
+    """Return ``means`` without the share of their differences that their errors alone would produce.
 
-    Along each principal axis of what they differ by only what exceeds the noise there is kept, by the factor of James
-    and Stein (1961, Proc. 4th Berkeley Symp. 1:361): 1 − noise/|m̂|² of the square, 0 at least.
+    Along each principal axis of the differences only the part that exceeds the noise is kept: the square is multiplied
+    by the factor of James and Stein (1961, Proc. 4th Berkeley Symp. 1:361), 1 − noise/|m̂|², at least 0.
 
     Parameters
     ----------
     means
-        (n, d).
+        Means to be shrunk, (n, d).
     noise
-        Sum over the d features of the covariance of their errors, (n, n).
+        Covariance of their errors, summed over the d features, (n, n).
     weights
-        How much each counts, (n,).
+        Weight of each mean, (n,).
 
     Returns
     -------
-    (n, d), of the same weighted mean.
+    Shrunk means (n, d), with the same weighted mean.
     """
     share = weights / weights.sum()
     off, root = np.eye(len(share)) - share, np.sqrt(share)[:, None]  # off @ x is x less its weighted mean

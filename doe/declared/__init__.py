@@ -1,5 +1,5 @@
 """The model that a measurement declares, and its pours.
 
-What is varied (`model.py`), which pour is that (`points.py`), how many there are (`budget.py`), how one is made, kept
-and read (`pours.py`). The diagnosis, its validation and `explorer limit` ask for them.
+`model.py` says what varies, `points.py` which pours there are, `budget.py` how many, and `pours.py` makes, stores and
+reads them. The diagnosis, its validation and `explorer limit` use all four.
 """

@@ -1,14 +1,14 @@
-"""What measured bodies say of effects: of a wrong density, size or shape, and of what acts at a contact with a plate.
+"""Evidence of measured bodies for effects: a wrong density, size or shape, and effects at a contact with a plate.
 
-On the scales of ``doe/measurement/bodies.py``, in standard errors, the numbers y of a model whose effects act at
-amplitudes a are
+On the scales of ``doe/measurement/bodies.py``, in standard errors, a model whose effects act at amplitudes a predicts
+the measured numbers
 
     y = y₀ + Σ_e s_e(a_e) + ε,    ε ~ N(0, 1 + K Kᵀ)
 
-with y₀ and s_e as the declared scene has them, by geometry or by simulated plate tests: no pour is needed for it. K is
-what the calibrated parameters do per standard deviation; what the piles say of them is not used here. An apparent
-friction μ (1 + F/(m g)) grows with the load F by which contacts adhere, and loads of two effects add up; not quite, as
-simplified JKR adhesion grows with the load itself, and a body may be heavier (``TOGETHER``).
+y₀ and the shifts s_e follow from the declared scene, by geometry or by simulated plate tests, without any pour. K holds
+the changes per standard deviation of each calibrated parameter; what the piles say of the parameters is not used here.
+An apparent friction μ (1 + F/(m g)) grows with the adhesive load F on a contact, and the loads of two effects add up,
+but only approximately: simplified JKR adhesion grows with the load itself, and a body may be heavier (``TOGETHER``).
 """
 
 from __future__ import annotations
@@ -30,27 +30,28 @@ from solver import EFFECTS, Scene, with_values
 
 FloatArray = npt.NDArray[np.float64]
 Acting = Sequence[tuple[str, float, float]]
-"""Effects that act together: name, amplitude, its standard deviation."""
+"""Effects that act together: name, amplitude, standard deviation of the amplitude."""
 
 PLACES = 14
-"""Amplitudes of either sign at which an effect is set up, closer together towards none, for the friction of a body that
-sticks grows as of 1 + c a; between them a monotone cubic (Fritsch and Butland 1984)."""
+"""Number of amplitudes of each sign at which an effect is set up. They are closer together towards zero, because the
+friction of an adhering body grows as 1 + c a; between them a monotone cubic interpolates (Fritsch and Butland 1984)."""
 NEGLIGIBLE = 0.1
-"""Shift at the end of an effect's range [standard errors] below which it does not move a number."""
+"""Shift at the end of an effect's range [standard errors] below which the effect is taken not to move a number."""
 TOGETHER = 0.2
-"""How well two effects that both move an apparent friction are known together, relative: of fifteen pairs that were
-tested on the trefoil none is further off the sum of loads, but simplified JKR adhesion by 0.2 beside another."""
+"""Relative standard error of an apparent friction that two effects both move: of fifteen pairs that were tested on the
+trefoil none is further off the sum of loads, but simplified JKR adhesion by 0.2 beside another effect."""
 LIKELY = 2.0
-"""Standard deviations of an amplitude about its best fit within which it may be."""
+"""Half width of the interval about its best fit in which an amplitude may lie [standard deviations]."""
 FINE = 9
-"""Amplitudes within the cell of one that is weighed: a balance may tell more than one from the next."""
+"""Amplitudes within the cell of each weighed one: a balance may resolve differences smaller than a cell."""
 
 
 @dataclass(frozen=True, eq=False)
 class BodyEvidence:
-    """The measured numbers ``rows``, and how far ``off`` those of the declared ``scene`` they are.
+    """The measured numbers ``rows``, and their differences ``off`` from those of the declared ``scene``.
 
-    ``factor``: (q, q), of the covariance 1 + K Kᵀ. ``off``: (q,), whitened by it. ``effects``: the candidates.
+    ``factor``: Cholesky factor (q, q) of the covariance 1 + K Kᵀ. ``off``: (q,), whitened by it. ``effects``: the
+    candidates.
     """
 
     scene: Scene
@@ -66,10 +67,10 @@ class BodyEvidence:
         return tuple((row.body, row.quantity) for row in self.rows)
 
     def log_density(self, label: str, amplitudes: FloatArray, cell: float) -> FloatArray:
-        """Log densities (n,) of the numbers, less those of numbers that agree, under "base", an effect, or "a+b".
+        """Log densities (n,) of the numbers under "base", an effect, or "a+b", relative to numbers that agree exactly.
 
-        Averaged over the cells of ``amplitudes`` (n, p), those of the effects in turn [natural units]: from 1/√``cell``
-        to √``cell`` times each.
+        Densities are averaged over a cell about each of ``amplitudes`` (n, p) [natural units], from 1/√``cell`` to
+        √``cell`` times the amplitude; the columns are the amplitudes of the effects in turn.
         """
         steps = cell ** ((np.arange(FINE) + 0.5) / FINE - 0.5)
         moved, column = [], 0
@@ -90,13 +91,13 @@ class BodyEvidence:
         return self._shift(name) is not None
 
     def shift(self, name: str, amplitudes: FloatArray) -> FloatArray:
-        """By how much [standard errors] an effect with one amplitude moves the numbers, at ``amplitudes``, (..., q)."""
+        """Shifts (..., q) of the numbers [standard errors] by an effect with one amplitude, at ``amplitudes`` (...)."""
         if (known := self._shift(name)) is None:
             return np.zeros((*amplitudes.shape, len(self.rows)))
         return np.asarray(known(np.clip(amplitudes, known.x[0], known.x[-1])))
 
     def predicted(self, acting: Acting) -> tuple[FloatArray, FloatArray]:
-        """Mean (q,) and covariance (q, q) of the numbers, whitened, with effects ``acting``."""
+        """Mean (q,) and covariance (q, q) of the whitened numbers with effects ``acting``."""
         moved = [one for one in acting if self.moved_by(one[0])]
         still = [self.shift(name, np.array(amplitude)) for name, amplitude, _ in moved]
         mean = self._together(still, (len(self.rows),))
@@ -109,9 +110,9 @@ class BodyEvidence:
         return _white(self.factor, mean), _white(self.factor, _white(self.factor, covariance).T)
 
     def told_apart(self, answers: Sequence[Acting]) -> npt.NDArray[np.bool_]:
-        """Numbers (q,) in which ``answers`` may differ by more than a standard deviation, parameters' in it.
+        """Whether ``answers`` may differ by more than a standard deviation, parameters included, in each number (q,).
 
-        They may act as much as ``LIKELY`` says: an effect that piles hardly show fits best at next to nothing.
+        Amplitudes range over ``LIKELY`` standard deviations: an effect that hardly shows in piles fits best near zero.
         """
         self.set_up(name for acting in answers for name, _, _ in acting)
         shifts = [
@@ -123,7 +124,7 @@ class BodyEvidence:
         return np.asarray(np.ptp(means, axis=0) > np.linalg.norm(self.factor, axis=1))
 
     def _together(self, shifts: Sequence[FloatArray], shape: tuple[int, ...]) -> FloatArray:
-        """By how much effects that act together move the numbers; ``shape``: of no effect."""
+        """Shift of the numbers by effects that act together; ``shape``: shape of the result without effects."""
         total = np.asarray(sum(shifts, np.zeros(shape)))
         for q, row in enumerate(self.rows):
             if len(shifts) > 1 and QUANTITIES[row.quantity].loads:
@@ -133,7 +134,7 @@ class BodyEvidence:
         return total
 
     def _factor_of(self, shifts: Sequence[FloatArray]) -> FloatArray:
-        """That of the covariance where these act: of two together less is known (``TOGETHER``)."""
+        """Cholesky factor of the covariance under these shifts; two together are known less well (``TOGETHER``)."""
         more = np.zeros(len(self.rows))
         for q, row in enumerate(self.rows):
             both = len(shifts) > 1 and all(np.abs(one[..., q]).max(initial=0.0) > NEGLIGIBLE for one in shifts)
@@ -142,13 +143,13 @@ class BodyEvidence:
         return np.asarray(np.linalg.cholesky(self.factor @ self.factor.T + np.diag(more**2)))
 
     def _shift(self, name: str) -> PchipInterpolator | None:
-        """By how much an effect moves the numbers, over its amplitude; None of an effect that moves none."""
+        """Shift of the numbers as a function of the effect's amplitude; None if the effect moves none of them."""
         if name not in self._shifts:
             self.set_up([name])
         return self._shifts[name]
 
     def set_up(self, names: Iterable[str]) -> None:
-        """Find by how much the effects ``names`` move the numbers: of all of them at once, so that no core waits."""
+        """Compute the shifts by the effects ``names``, all in one batch so that no core waits."""
         known = {one.name: one for one in self.effects}
         effects = [known[name] for name in dict.fromkeys(names) if name not in self._shifts]
         ends = {one.name: [end for end in (one.low[0], one.high[0]) if end] for one in effects if one.amplitudes == 1}
@@ -162,7 +163,7 @@ class BodyEvidence:
         self._shifts.update({name: PchipInterpolator(places[name], y) for name, y in self._moved(places).items()})
 
     def _moved(self, amplitudes: Mapping[str, Sequence[float] | FloatArray]) -> dict[str, FloatArray]:
-        """By how much [standard errors] each effect moves the numbers at its ``amplitudes``, (n, q)."""
+        """Shifts (n, q) of the numbers [standard errors] by each effect at its ``amplitudes``."""
         if not amplitudes:
             return {}
         scenes = [
@@ -176,13 +177,13 @@ class BodyEvidence:
 
 
 def _white(factor: FloatArray, shift: FloatArray) -> FloatArray:
-    """Rows of ``shift`` (..., q), whitened by ``factor``."""
+    """``shift`` (..., q), with each row whitened by ``factor``."""
     flat = shift.reshape(-1, len(factor)).T
     return np.asarray(solve_triangular(factor, flat, lower=True).T.reshape(shift.shape))
 
 
 def body_evidence(measurement: Measurement, declared: Declared) -> BodyEvidence | None:
-    """What the measured bodies of ``measurement`` say; None where it has none."""
+    """Evidence of the measured bodies of ``measurement``; None if it has none."""
     if not measurement.bodies:
         return None
     found = _evidence(measurement, declared, measurement.bodies)
@@ -191,12 +192,12 @@ def body_evidence(measurement: Measurement, declared: Declared) -> BodyEvidence 
 
 
 def wanted_bodies(measurement: Measurement, declared: Declared, answers: Sequence[Acting]) -> BodyEvidence | None:
-    """What measuring bodies would say of ``answers``, with the usual standard errors; None for nothing.
+    """Measurements of single bodies, not made yet, in which ``answers`` differ; None if there are none.
 
-    Only what is not measured yet, and in which two answers differ.
+    Standard errors are the usual ones of each quantity.
     """
     known = {(one.body, one.quantity) for one in measurement.bodies}
-    # Of a mean of one a relative error is the error.
+    # With a mean of one the relative error equals the error.
     rows = [
         MeasuredBody(body.name, name, 1.0, quantity.usual)
         for body in measurement.fit[0].scene.bodies
@@ -228,7 +229,7 @@ def _evidence(measurement: Measurement, declared: Declared, rows: Sequence[Measu
 
 @dataclass(frozen=True)
 class BodyRow(Record):
-    """A number of single bodies, SI: as measured, of the declared model, and of the final one."""
+    """A number of single bodies, SI: as measured, in the declared model, and in the final model."""
 
     body: str
     quantity: str
@@ -240,7 +241,7 @@ class BodyRow(Record):
 
 
 def body_rows(scene: Scene, measured: Sequence[MeasuredBody], acting: Mapping[str, Sequence[float]]) -> list[BodyRow]:
-    """``measured`` beside the declared ``scene``, and beside it with effects ``acting`` at their amplitudes."""
+    """``measured`` compared with the declared ``scene``, and with that scene under effects ``acting`` (amplitudes)."""
     final = with_values(
         scene, {path: x for name, one in acting.items() for path, x in effect_values(name, one).items()}
     )

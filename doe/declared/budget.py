@@ -1,4 +1,4 @@
-"""How many pours a diagnosis takes for its models. Loads nothing that compiles, for the page asks it too."""
+"""How many pours a diagnosis spends on its models. Imports nothing that compiles, because the page uses it too."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from doe.measurement.measurement import Measurement
 
 @dataclass(frozen=True)
 class Budget:
-    """How many pours a diagnosis takes for its models, in each condition."""
+    """Pours that a diagnosis spends on its models in each condition."""
 
     base: int = 24
     screening: int = 6
-    """Of each direction of an effect."""
+    """For each direction of an effect."""
     more: int = 8
-    """At each look, of what stays in question."""
+    """At each look, for what stays in question."""
     looks: int = 4
 
     def planned(self, directions: int, conditions: int) -> int:
-        """Pours before the first look, amplitudes found at once."""
+        """Pours before the first look, if every amplitude is found at once."""
         return conditions * (self.base + directions * self.screening)
 
     def scaled(self, runs: int, directions: int, conditions: int) -> Budget:
-        """The same shares in at most ``runs`` pours. Raises StatisticsError for fewer than ``LEAST`` takes."""
+        """The same proportions in at most ``runs`` pours. Raises StatisticsError if ``LEAST`` needs more."""
         least = LEAST.planned(directions, conditions)
         if runs < least:
             raise StatisticsError(
@@ -35,7 +35,7 @@ class Budget:
                 f"{conditions} fitted conditions"
             )
         share = runs / self.planned(directions, conditions)
-        # What is held at its least is taken from the rest.
+        # Numbers held at their minimum are paid for by the others.
         while (found := self._shares(share)).planned(directions, conditions) > runs:
             share *= 0.99
         return found
@@ -46,7 +46,7 @@ class Budget:
 
 
 LEAST = Budget(base=12, screening=2, more=4)
-"""Below that there is no covariance."""
+"""With fewer pours no covariance can be estimated."""
 
 
 def scaled_budget(runs: int, measurement: Measurement, effects: Sequence[str]) -> Budget:

@@ -1,7 +1,7 @@
-"""Effects that are known to be there: they join the declared model, and what else is missing can be asked.
+"""Effects that are known to act: they join the declared model, so that a diagnosis can ask what else is missing.
 
-Two effects do not add up in a pile, so that pours of a second one alone do not say what it does beside the first
-(``docs/limit.md``, 10). With the first one in the declared model, every pour that teaches has it.
+The shifts of two effects in a pile do not add up, so pours of the second effect alone do not show what it does beside
+the first (``docs/limit.md``, 10). With the first effect in the declared model, every teaching pour includes it.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from doe.measurement.measurement import MeasuredParameter, Measurement
 from solver import EFFECTS, Scene, parameters, with_values
 
 SPAN = 0.6
-"""Half width of a given amplitude's range over its size: what data tell of one is some 20 to 50 % wide, and rounding
-moves it by up to 19 %."""
+"""Half width of a given amplitude's range, relative to its size: data determine an amplitude to some 20 to 50 %, and
+rounding moves it by up to 19 %."""
 
 LEAST = 0.01
-"""Share of the strongest below which there is nothing to be given."""
+"""Smallest amplitude that may be given, as a share of the effect's strongest."""
 
 Given = Mapping[str, Sequence[float]]
 """Effect → amplitudes [natural units]."""
@@ -29,11 +29,11 @@ Given = Mapping[str, Sequence[float]]
 def with_given(measurement: Measurement, given: Given) -> Measurement:
     """``measurement`` with the effects ``given`` in the declared model of every condition.
 
-    Each amplitude is calibrated with the other parameters, within ``SPAN`` of what is given and no farther than the
-    literature and the conditions' rigs allow. Its size is rounded to a power of √2 below the strongest first, so that
-    data sets of one model share their pours.
+    Each amplitude is calibrated with the other parameters, within ``SPAN`` of the given value and within the limits of
+    the literature and of the conditions' rigs. First its size is rounded to the strongest amplitude divided by a power
+    of √2, so that data sets of one model share their pours.
 
-    Raises MeasurementError where an amplitude is a parameter of the data already, or is next to nothing.
+    Raises MeasurementError if an amplitude is already a parameter of the data, or is close to zero.
     """
     for effect, amplitude in given.items():
         scenes = [one.scene for one in measurement.conditions]
@@ -68,7 +68,7 @@ def _rounded(effect: str, amplitude: Sequence[float]) -> tuple[float, ...]:
 
 
 def _within(amplitude: Sequence[float], bounds: CandidateEffect) -> tuple[float, ...]:
-    """``amplitude``, shorter where it would leave what every condition can be set up with."""
+    """``amplitude``, shortened where needed to stay within the ``bounds`` that every condition can be set up with."""
     ends = (high if one > 0.0 else low for one, low, high in zip(amplitude, bounds.low, bounds.high, strict=True))
     share = min((end / one for one, end in zip(amplitude, ends, strict=True) if one != 0.0), default=1.0)
     return tuple(min(1.0, share) * one for one in amplitude)

@@ -1,8 +1,8 @@
-"""What is declared, as a diagnosis takes it: calibrated parameters, candidate effects, conditions with their numbers.
+"""The declared model that a diagnosis works with: calibrated parameters, candidate effects, conditions and summaries.
 
 A condition is one rig set-up; its summaries are the d_c numbers read from one pour. Parameters are calibrated within
-[low, high] and are told in units of their ``deviation`` off their ``middle``; an effect is off in the base model, at
-amplitude zero.
+[low, high] and are expressed as differences from their ``middle`` in units of their ``deviation``. In the base model
+every effect is off, at amplitude zero.
 """
 
 from __future__ import annotations
@@ -23,13 +23,14 @@ from solver import EFFECTS, ParameterError, Scene, parameters, with_values
 FloatArray = npt.NDArray[np.float64]
 
 BOX = 3.0
-"""Standard deviations about an independently measured mean within which a parameter is believed."""
+"""Half width of the interval about an independently measured mean in which a parameter is believed to lie [standard
+deviations]."""
 DRAWN_IN = 0.8
 
 
 @dataclass(frozen=True)
 class CalibratedParameter(Record):
-    """A calibrated parameter, natural units: range of measurement, and mean ± sd where it was measured independently.
+    """A calibrated parameter, natural units: its range, and mean ± sd where it was measured independently.
 
     Raises StatisticsError unless low < high, and sd > 0 where there is a mean.
     """
@@ -55,25 +56,25 @@ class CalibratedParameter(Record):
 
     @property
     def deviation(self) -> float:
-        """The measurement's standard deviation, or that of an even distribution over the range, its width ÷ √12."""
+        """The measurement's standard deviation, or that of a uniform distribution over the range, its width ÷ √12."""
         return self.sd if self.sd is not None else (self.high - self.low) / math.sqrt(12.0)
 
     def within(self, value: float) -> float:
-        """``value`` drawn into the range."""
+        """``value``, clipped to the range."""
         return min(self.high, max(self.low, value))
 
     def natural(self, theta: float) -> float:
-        """Natural units of ``theta`` deviations off the middle, within the range."""
+        """The value in natural units at ``theta`` deviations from the middle, clipped to the range."""
         return self.within(self.middle + theta * self.deviation)
 
     def theta(self, value: float) -> float:
-        """Deviations off the middle of a ``value`` in natural units."""
+        """The difference of ``value`` [natural units] from the middle, in deviations."""
         return (value - self.middle) / self.deviation
 
 
 @dataclass(frozen=True)
 class CandidateEffect(Record):
-    """A candidate effect with one or two amplitudes, each within [low, high] around or above zero (off).
+    """A candidate effect with one or two amplitudes, each in a range [low, high] that contains zero (off).
 
     Raises StatisticsError for another number of amplitudes or a range without zero.
     """
@@ -90,13 +91,13 @@ class CandidateEffect(Record):
 
     @property
     def amplitudes(self) -> int:
-        """Return the number of amplitudes."""
+        """Number of amplitudes."""
         return len(self.low)
 
 
 @dataclass(frozen=True)
 class DeclaredCondition(Record):
-    """A set-up and the names of the summaries read from each of its pours."""
+    """A rig set-up, and the names of the summaries read from each of its pours."""
 
     name: str
     summaries: tuple[str, ...]
@@ -111,23 +112,23 @@ class Declared(Record):
     conditions: tuple[DeclaredCondition, ...]
 
     def natural(self, theta: Sequence[float] | FloatArray) -> tuple[float, ...]:
-        """Parameters in natural units, of ``theta`` (k,) deviations off their middles."""
+        """Parameters in natural units at ``theta`` (k,) deviations from their middles."""
         return tuple(p.natural(float(one)) for p, one in zip(self.parameters, theta, strict=True))
 
     def theta(self, values: Sequence[float]) -> FloatArray:
-        """Deviations (k,) off their middles of parameters in natural units."""
+        """Differences (k,) of parameters ``values`` [natural units] from their middles, in deviations."""
         return np.array([p.theta(one) for p, one in zip(self.parameters, values, strict=True)])
 
 
 def declare(measurement: Measurement, effects: Sequence[str]) -> Declared:
     """The declared model: parameters, effects with their widest ranges, fitted conditions.
 
-    Effects that a contact law does not go with are no candidates, and none whose amplitude is a parameter.
+    Not candidates: effects that a scene's contact law cannot carry, and effects whose amplitude is a parameter.
     """
     scenes = [condition.scene for condition in measurement.conditions]
     known = {effect_of(p.path) for p in measurement.parameters}
     effects = [name for name in effects if name not in known and all(scene.contact.carries(name) for scene in scenes)]
-    # Beside an amplitude that is calibrated an effect has to be possible at both ends of that.
+    # Every effect has to be possible at both ends of each calibrated amplitude.
     amplitudes = [p for p in measurement.parameters if effect_of(p.path)]
     scenes = [
         with_values(one.scene, {p.path: in_rig_frame(p.path, getattr(p, end), one.turned) for p in amplitudes})
@@ -142,7 +143,7 @@ def declare(measurement: Measurement, effects: Sequence[str]) -> Declared:
 
 
 def widest(name: str, scenes: Sequence[Scene]) -> CandidateEffect:
-    """The effect from end to end of what the literature supports, drawn in until every scene can be set up with it."""
+    """The effect over the range that the literature supports, narrowed until every scene can be set up with it."""
     kind, known = EFFECTS[name], parameters(scenes[0])
     ends = [known[f"effect.{name}.{field}"] for field in kind.amplitudes]
     low = tuple(max(end.low, -kind.strongest) for end in ends)
@@ -153,21 +154,21 @@ def widest(name: str, scenes: Sequence[Scene]) -> CandidateEffect:
 
 
 def effect_values(effect: str, amplitude: Sequence[float], turned: bool = False) -> dict[str, float]:
-    """Parameter path → value of an effect's amplitudes; ``turned``: in a rig that is turned by 180° on its bench."""
+    """Parameter path → value of an effect's amplitudes; ``turned``: for a rig that is turned by 180° on its bench."""
     paths = (f"effect.{effect}.{name}" for name in EFFECTS[effect].amplitudes)
     return {path: in_rig_frame(path, one, turned) for path, one in zip(paths, amplitude, strict=True)}
 
 
 def in_rig_frame(path: str, amplitude: float, turned: bool) -> float:
-    """The value of the parameter ``path`` as the rig sees it: in a rig that is ``turned`` by 180° on its bench, what
-    stays with the bench acts the other way.
+    """The value of the parameter ``path`` in the frame of the rig: in a rig that is ``turned`` by 180° on its bench,
+    effects that stay with the bench change sign.
     """
     effect = effect_of(path)
     return -amplitude if turned and effect and EFFECTS[effect].on_bench else amplitude
 
 
 def effect_of(path: str) -> str:
-    """The effect of which the parameter ``path`` is an amplitude; "" of any other parameter."""
+    """The effect that has the parameter ``path`` as an amplitude; "" for any other parameter."""
     kind, _, rest = path.partition(".")
     name, _, field = rest.partition(".")
     return name if kind == "effect" and name in EFFECTS and field in EFFECTS[name].amplitudes else ""
@@ -185,7 +186,7 @@ def possible(scene: Scene, name: str, amplitude: tuple[float, ...]) -> bool:
 def box_of(measured: MeasuredParameter) -> CalibratedParameter:
     """The range over which a parameter is simulated: as stated, and within ``BOX`` standard deviations of its mean.
 
-    Farther off nobody who trusts the measurement would look.
+    Nobody who trusts the measurement would look outside it.
     """
     if measured.mean is None or measured.sd is None:
         return CalibratedParameter(measured.path, measured.low, measured.high)

@@ -1,12 +1,12 @@
 """Which pours a diagnosis asks for: they belong to the declared model and its rigs, not to one data set.
 
-A point is one setting with a number in a fixed sequence, so that the same model asks for the same pours again, and more
-pours continue a sequence instead of beginning another. In the sequences that teach, parameters are moved by one
-deviation to either side, by the Walsh functions of the number: over every four (of three parameters) each is at either
-side as often, and no two go together, so what parameters do costs no pours of its own.
+A point is one setting with a number in a fixed sequence. The same model therefore asks for the same pours again, and
+more pours continue a sequence instead of starting another. In the teaching sequences each parameter is moved by one
+deviation to either side, by Walsh functions of the number: in every four pours (of three parameters) each parameter is
+on either side equally often and no two are correlated, so the effects of parameters cost no extra pours.
 
-Exact symmetries stand in for pours. In a rig that looks the same after a quarter turn, a pile on a tilted plate turned
-by a quarter is a pile on a plate tilted the other way; and the pile of a displaced funnel is the pile, displaced.
+Exact symmetries replace pours. In a rig that looks the same after a quarter turn, turning the pile on a tilted plate by
+a quarter gives the pile on a plate tilted in another direction; the pile of a displaced funnel is the pile, displaced.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from solver import Record as PourRecord
 
 @dataclass(frozen=True)
 class View:
-    """How a pour is looked at: its pile after ``turns`` quarter turns about the rig's axis, then displaced by
-    ``shift`` (x, y) [m], its surface seen through ``sight``.
+    """How a pour is viewed: its pile is turned by ``turns`` quarter turns about the rig's axis, then displaced by
+    ``shift`` (x, y) [m], and its surface is seen through ``sight``.
     """
 
     turns: int = 0
@@ -36,14 +36,14 @@ class View:
 
     @property
     def label(self) -> str:
-        """What the name of a number that is read so ends with."""
+        """Suffix of the names of numbers that are read in this view."""
         if self == AS_IT_IS:
             return ""
         through = "" if self.sight == PERFECT else f" {self.sight.label}"
         return f"|{self.turns} {self.shift[0]:.6g} {self.shift[1]:.6g}{through}"
 
     def of(self, record: PourRecord) -> PourRecord:
-        """``record`` with its pile so."""
+        """``record`` with its pile turned and displaced."""
         pile = record.pile
         if self == AS_IT_IS:
             return record
@@ -66,7 +66,7 @@ BASE = "base"
 
 @dataclass(frozen=True)
 class Point:
-    """One setting of the declared model. ``sequence`` and ``number`` name it for good and give its seeds."""
+    """One setting of the declared model. ``sequence`` and ``number`` identify it permanently and give its seeds."""
 
     sequence: str
     number: int
@@ -77,20 +77,20 @@ class Point:
     view: View = AS_IT_IS
 
     def seen(self, view: View) -> Point:
-        """The same pour, looked at otherwise."""
+        """The same pour in another view."""
         return dataclasses.replace(self, view=view)
 
 
 @dataclass(frozen=True)
 class Direction(Record):
-    """One way in which an effect can act: its amplitudes are multiples of ``full``, the ends of its range.
+    """One direction in which an effect can act: its amplitudes are multiples of ``full``, the end of its range.
 
-    ``angle`` [rad]: of a direction in the plane.
+    ``angle`` [rad]: that of a direction in the plane, else None.
     """
 
     effect: str
     name: str
-    """The effect's, with the sign or the axis where there are several."""
+    """The effect's name, with the sign or axis if the effect has several directions."""
     full: tuple[float, ...]
     angle: float | None = None
 
@@ -100,13 +100,13 @@ class Direction(Record):
 
 
 def directions_of(effect: CandidateEffect) -> list[Direction]:
-    """Up and, where there is one, down; of two amplitudes along +x, +y, −x and −y."""
+    """Directions of ``effect``: up and, if its range goes below zero, down; +x, +y, −x and −y with two amplitudes."""
     name = effect.name
     if effect.amplitudes == 2:
         (east, north), (west, south) = effect.high, effect.low
         ends = ((east, 0.0), (0.0, north), (west, 0.0), (0.0, south))
         signs = ("+x", "+y", "-x", "-y")
-        # One size in all directions, so that one amplitude serves for those between.
+        # One size in all directions, so that one amplitude also serves the directions in between.
         size = min(abs(a) + abs(b) for a, b in ends)
         return [
             Direction(
@@ -123,7 +123,7 @@ def directions_of(effect: CandidateEffect) -> list[Direction]:
 
 
 def moved(declared: Declared, number: int) -> tuple[float, ...]:
-    """Parameters [natural units] of pour ``number`` of a sequence: each a deviation off its middle, within range."""
+    """Parameters [natural units] of pour ``number`` of a sequence: each one deviation off its middle, within range."""
     return declared.natural([_walsh(number, j + 1) for j in range(len(declared.parameters))])
 
 
@@ -138,7 +138,7 @@ def base_points(declared: Declared, number: int, first: int = 0) -> list[Point]:
 
 def far_points(declared: Declared, parameter: int, theta: float, number: int) -> list[Point]:
     """``number`` pours of the base model with ``parameter`` at ``theta`` deviations off its middle, within its range:
-    what moves by one to either side does not tell how bent an answer is.
+    moves of one deviation to either side do not show how curved a response is.
     """
     name, natural = declared.parameters[parameter].name, declared.parameters[parameter].natural(theta)
     points = [Point(f"base {name}@{natural:.6g}", k, moved(declared, k)) for k in range(number)]

@@ -1,4 +1,4 @@
-"""Pours of the declared model: points of a plan in, summaries per condition out; every pour is kept in the store."""
+"""Pours of the declared model: takes points, returns summaries per condition, and keeps every pour in the store."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from solver import EFFECTS, Job, Outcome, ParameterError, Record, Scene, observe
 
 PROFILE = "height_profile_m"
 ROOT = 0
-"""Root of the seeds: the same for every data set of a model, so that its pours are found again."""
+"""Root of the seeds: the same for every data set of a model, so that its pours are found again in the store."""
 
 
 @dataclass(frozen=True)
 class Ended:
     """How one pour ended. ``label``: point and condition.
 
-    No seed is tried again: the other points carry the emulator.
+    A failed pour is not repeated with another seed: the other points suffice for the emulator.
     """
 
     label: str
@@ -38,13 +38,13 @@ class Ended:
     replicate: int = 0
     attempt: int = 0
     wall_s: float = 0.0
-    """What it cost [s]."""
+    """Wall time of the pour [s]."""
     reused: bool = False
-    """Pours that are found in the store are not told."""
+    """Always false here: pours found in the store are not reported."""
 
     @property
     def title(self) -> str:
-        """What it is called in lists."""
+        """Its name in lists."""
         return self.label
 
     @property
@@ -54,19 +54,19 @@ class Ended:
 
 
 OnPour = Callable[[str, int, Ended], None]
-"""Called with (what is being run, pours still to come, how this one ended)."""
+"""Called with (what is being run, number of pours left, how this pour ended)."""
 
 
 @dataclass(frozen=True)
 class PointPour:
-    """What one pour of a point in a condition gave; NaN where nothing could be read."""
+    """Results of one pour of a point in a condition; NaN for numbers that could not be read."""
 
     summaries: tuple[float, ...]
     outcome: str
     profile: tuple[float, ...] = ()
-    """Mean heights [m] for a picture; nothing is decided by them."""
+    """Mean heights [m] for a plot; no decision uses them."""
     surface: tuple[float, ...] = ()
-    """The features of the pile's surface (``doe/measurement/features.py``), which follow the summaries."""
+    """Features of the pile's surface (``doe/measurement/features.py``), which come after the summaries."""
 
     @property
     def valid(self) -> bool:
@@ -78,20 +78,20 @@ Rows = list[list[PointPour]]
 """Pours per point and condition."""
 Result = TypeVar("Result")
 Search = Generator[Sequence[Point], Rows, Result]
-"""Asks for pours of points, as often as it needs, and ends with what it has found."""
+"""Generator that asks for pours of points, as often as it needs, and returns its result."""
 Place = tuple[Point, int]
 """Point and number of a condition."""
 
 
 def once(points: Sequence[Point]) -> Search[Rows]:
-    """The search that asks for ``points`` and ends with their pours."""
+    """A search that asks for ``points`` once and returns their pours."""
     return (yield points)
 
 
 def room_of(conditions: Sequence[Condition]) -> list[Scene]:
-    """Scenes that need as much room as most points: every condition at the ends of each effect, where it can be.
+    """Scenes that need as much capacity as most points: every condition at the ends of each effect, where possible.
 
-    The same at every stage, so that a worker compiles its batches once.
+    They are the same at every stage, so that a worker compiles its batches once.
     """
     room: list[Scene] = []
     for condition in conditions:
@@ -104,7 +104,7 @@ def room_of(conditions: Sequence[Condition]) -> list[Scene]:
 
 
 class ModelPours:
-    """Runs points of one declared model under its conditions. Points asked for before are not run again."""
+    """Runs points of one declared model under its conditions, each point only once."""
 
     def __init__(
         self,
@@ -116,22 +116,22 @@ class ModelPours:
         root: int = ROOT,
         place: int | None = None,
     ) -> None:
-        """``place``: of all ``conditions`` in the data that they are possible additions to, for their seeds; else each
-        has its own.
+        """``place``: index that all ``conditions`` use for their seeds, if they are possible additions to the data; by
+        default each condition uses its own index.
         """
         self._conditions, self._paths, self._store = tuple(conditions), tuple(paths), store
         self._names = [(profile_names(one), feature_set(one)) for one in conditions]
-        """Of what is read off a pour, by condition."""
+        """Names of the profile and the feature set that are read off a pour, by condition."""
         self._places = [c if place is None else place for c in range(len(conditions))]
         self._pours, self._on_pour, self._root = pours, on_pour, root
         self._known: dict[Place, PointPour] = {}
         self._keys: dict[Place, str] = {}
-        """Of the pours that are asked for, looked at as they are."""
+        """Store keys of the requested pours, whatever their view."""
         self.run_now = 0
-        """Pours that were really run, not found in the store."""
+        """Number of pours that were run and not found in the store."""
 
     def run(self, what: str, points: Sequence[Point], where: Sequence[int] | None = None) -> Rows:
-        """Pours of every point, one per condition, or per condition ``where``."""
+        """Pours of every point, one per condition, or one per condition in ``where``."""
         return self.answered(what, [once(points)], where)[0]
 
     def answered(
@@ -141,11 +141,11 @@ class ModelPours:
         where: Sequence[int] | None = None,
         widest: Sequence[Point] = (),
     ) -> list[Result]:
-        """What each of ``searches`` ends with. Each is answered as soon as its own pours are there.
+        """The results of ``searches``. Each search continues as soon as its own pours are done.
 
-        A point that is asked for in answer to pours goes first, so that a search of many steps does not come last;
-        several at once go last, as no further step waits for them. They have to fit into the room that the first
-        points and the points ``widest`` need.
+        A single point that a search asks for on continuing goes to the front of the queue, so that a search of many
+        steps does not finish last; several points at once go to the back, as no further step waits for them. They must
+        fit into the capacity that the first points and the points ``widest`` need.
         """
         asked = range(len(self._conditions)) if where is None else where
         found: dict[int, Result] = {}
@@ -155,7 +155,7 @@ class ModelPours:
         queue: deque[Job] = deque()
 
         def resumed(k: int) -> list[Job]:
-            """Jobs that search ``k`` waits for now; none where it has ended."""
+            """Jobs that search ``k`` now waits for; none if it has ended."""
             try:
                 while True:
                     rows = [[self._known[point, c] for c in asked] for point in points[k]] if k in points else None
@@ -195,7 +195,7 @@ class ModelPours:
         return [found[k] for k in range(len(searches))]
 
     def records(self, points: Sequence[Point], condition: int) -> list[Record]:
-        """What is kept of the pours of ``points`` that came to a valid end, which have been asked for before."""
+        """Records of the pours of ``points`` that came to a valid end; the points have been asked for before."""
         stored = [self._store.find(self._key(point, condition)) for point in points]
         return [unpacked(one.raw) for one in stored if one is not None and Outcome(one.outcome).valid]
 
@@ -214,7 +214,7 @@ class ModelPours:
         return seed_of(self._root, point.sequence, point.number, self._places[condition], 0)
 
     def _possible(self, points: Sequence[Point], where: Sequence[int]) -> list[Scene]:
-        """Scenes of ``points``, less those that there cannot be."""
+        """Scenes of ``points``, without those that are impossible."""
         scenes: list[Scene] = []
         for point in points:
             for c in where:
@@ -223,7 +223,7 @@ class ModelPours:
         return scenes
 
     def _find(self, point: Point, condition: int) -> bool:
-        """Whether the pour is known, here or in the store."""
+        """Whether the pour is known, in memory or in the store."""
         place = point, condition
         if place not in self._known:
             stored = self._store.find(self._key(point, condition))
@@ -236,7 +236,7 @@ class ModelPours:
         return place in self._known
 
     def _key(self, point: Point, condition: int) -> str:
-        """Key of the pour of ``point`` in a condition, however it is looked at."""
+        """Store key of the pour of ``point`` in a condition, whatever the view."""
         place = point.seen(AS_IT_IS), condition
         if place not in self._keys:
             self._keys[place] = pour_key(self.scene(point, condition), self.seed(point, condition))
@@ -250,7 +250,7 @@ class ModelPours:
         return self._pour(condition, stored, point.view)
 
     def _pour(self, condition: int, stored: StoredRun, view: View) -> PointPour:
-        """What is kept of a stored pour; NaN for what could not be read."""
+        """The numbers of a stored pour; NaN for those that could not be read."""
         profile, features = self._names[condition]
 
         def numbers(names: Sequence[str]) -> tuple[float, ...]:
@@ -263,18 +263,18 @@ class ModelPours:
 
 
 def measured_profile(condition: Condition) -> Observation | None:
-    """The measured profiles: places x (k,) [m], values (replicates, k) [m]; None where the data offer none."""
+    """The measured profiles: positions x (k,) [m], values (replicates, k) [m]; None if the data offer none."""
     return condition.offered.get(PROFILE)
 
 
 def profile_names(condition: Condition) -> tuple[str, ...]:
-    """Names under which the k heights of a pour are kept; none where the data offer no profile."""
+    """Names under which the k heights of a pour are kept; none if the data offer no profile."""
     profile = measured_profile(condition)
     return () if profile is None or profile.x is None else tuple(f"{PROFILE}({x:g})" for x in profile.x)
 
 
 def profile_of_record(condition: Condition, record: Record) -> tuple[float, ...]:
-    """Heights (k,) [m] of a run at the measured places; none where the data offer no profile."""
+    """Heights (k,) [m] of a run at the measured positions; none if the data offer no profile."""
     profile = measured_profile(condition)
     if profile is None or profile.x is None:
         return ()
@@ -282,7 +282,7 @@ def profile_of_record(condition: Condition, record: Record) -> tuple[float, ...]
 
 
 def reader(condition: Condition, view: View = AS_IT_IS) -> Reader:
-    """What a diagnosis reads off a pour of ``condition``: its profile, its summaries, and features of its surface."""
+    """The function that reads a pour of ``condition`` for a diagnosis: profile, summaries, and surface features."""
 
     def read(record: Record) -> dict[str, float]:
         record = view.of(record)

@@ -1,4 +1,4 @@
-"""Set-ups beside the fitted one: the changes of a rig that a laboratory can make in minutes."""
+"""Alternatives to the fitted set-up: changes of a rig that a laboratory can make in minutes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from solver import ParameterError, Scene, parameters, pour_rig, value, with_valu
 class Change(Record):
     """A change of the first fitted condition that a laboratory can make in minutes.
 
-    ``factors`` multiply its parameters, ``choices`` replace settings.
+    ``factors`` multiply parameters, ``choices`` replace settings.
     """
 
     name: str
@@ -24,15 +24,15 @@ class Change(Record):
     choices: Mapping[str, str] = field(default_factory=dict)
 
     def named(self, turned: bool) -> str:
-        """Its name, with the rig ``turned`` by 180° on its bench or not."""
+        """Its name, for the rig ``turned`` by 180° on its bench or not."""
         if not turned:
             return self.name
         return f"{self.name}, {TURNED}" if self.factors or self.choices else TURNED
 
 
 TURNED = "rig turned by 180° on its bench"
-"""What any change is made with where an effect with a direction is left: it costs no pours, for all else is the same in
-a turned rig, and tells what stays with the bench from what turns with the rig."""
+"""Added to any change while an effect with a direction is still in question: it costs no pours, because all else is the
+same in a turned rig, and it distinguishes what stays with the bench from what turns with the rig."""
 CHANGES = (
     Change("as it is, poured again"),
     Change("half the mass", {"rig.mass": 0.5}),
@@ -42,31 +42,31 @@ CHANGES = (
     Change("dropped four times as fast", {"insertion.drop_speed": 4.0}),
     Change("filled with the outlet closed, then opened", choices={"insertion.protocol": "fill_then_open"}),
 )
-"""Of any rig but for what it ``forgets``; each has its own beside them (``PourRig.quick_changes``)."""
+"""Changes of any rig, except of what it ``forgets``; each rig adds its own (``PourRig.quick_changes``)."""
 
 
 def changed(condition: Condition, name: str, values: Mapping[str, float | str], about: bool) -> Condition:
-    """``condition`` under another name, with ``values`` set and the rig turned ``about`` on its bench."""
+    """``condition`` under another name, with ``values`` set and, if ``about``, with its rig turned on the bench."""
     scene = turned_scene(condition.scene) if about else condition.scene
     return replace(condition, name=name, scene=with_values(scene, dict(values)), turned=condition.turned != about)
 
 
 def feasible(scene: Scene, calibrated: Collection[str] = ()) -> list[tuple[Change, dict[str, float | str]]]:
-    """The changes that the rig of ``scene`` can do, with the values [SI] that they come to.
+    """The changes that the rig of ``scene`` allows, each with the values [SI] that it sets.
 
-    None of what is ``calibrated``: every pour sets that by itself.
+    Changes of ``calibrated`` parameters are left out, because every pour sets those itself.
     """
     found = []
     known = set(parameters(scene)) - set(calibrated) - set(pour_rig(scene).forgets)
     for change in (*CHANGES, *(Change(*own) for own in pour_rig(scene).quick_changes.items())):
         if "insertion.protocol" in change.choices and scene.numerics.duration > 0.0:
-            continue  # filled first, it would be read before it has run out
+            continue  # filled first, the rig would be read before it has run out
         if not set(change.factors) | set(change.choices) <= known:
             continue
         values: dict[str, float | str] = {path: f * float(value(scene, path)) for path, f in change.factors.items()}
         values |= change.choices
         if values and all(value(scene, path) == new for path, new in values.items()):
-            continue  # as it is already
+            continue  # changes nothing
         with suppress(ParameterError):  # beyond what the rig allows
             with_values(scene, dict(values))
             found.append((change, values))

@@ -1,16 +1,16 @@
-"""Made-up laboratories: data with a truth that the diagnosis cannot read, and how often it finds it.
+"""Made-up laboratories: data with a truth that is hidden from the diagnosis, and how often the diagnosis finds it.
 
-    laboratories/      files of laboratories: bodies, rig, conditions, what is handed out
+    laboratories/      laboratory files: bodies, rig, conditions, what is handed out
     truth.py           which truths are asked for, and the parameters and amplitudes of each
-    outside.py         effects that no library holds
-    work_place.py      pours in worker processes, and the clock
+    outside.py         effects that are not in the library
+    work_place.py      pours in worker processes, and the deadline
     scanner.py         a made-up scanner
-    laboratory.py      reads such a file; pours → a folder of measured data, with scans or without
-    sets.py            rows in sets.jsonl, what an answer is worth, rates and targets
-    reference.py       pours of every effect, many of each, that tell how strong it is
-    limit.py           its strength in σ, and how often any method could name it
-    cross_validation.py  the rule of the diagnosis on reference pours
-    campaign.py        all of it, truths → folders → verdicts → rows, for ``explorer validate-diagnosis``
+    laboratory.py      reads a laboratory file; pours → a folder of measured data, with or without scans
+    sets.py            rows in sets.jsonl, scores of the answers, rates and targets
+    reference.py       many pours of every effect, which measure its strength
+    limit.py           the strength of an effect in σ, and how often any method could name it
+    cross_validation.py  the rule of the diagnosis, tested on reference pours
+    campaign.py        the whole chain, truths → folders → verdicts → rows, for ``explorer validate-diagnosis``
 
 The diagnosis is given the folder and nothing else: no truth, no label, no number.
 """

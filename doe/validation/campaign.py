@@ -1,9 +1,9 @@
 """The blind campaign, from cases to rows: laboratories pour, the diagnosis answers, and the answers are kept.
 
-Truths are drawn, poured, judged with and without scans, and tried on what was held out. A set takes ``REPLICATES``
-pours per condition and is judged twice, by its table of numbers alone and with its scans. The pours that teach belong
-to the declared model, so that sets share them through the store. Two processes with ``--shard 1/2`` and ``--shard 2/2``
-work on one campaign.
+Truths are drawn, poured, diagnosed with and without scans, and tested on held-out data. A data set takes ``REPLICATES``
+pours per condition and is judged twice, by its table of numbers alone and with its scans. The teaching pours belong to
+the declared model, so data sets share them through the store. Two processes with ``--shard 1/2`` and ``--shard 2/2``
+share one campaign.
 """
 
 import time
@@ -43,23 +43,23 @@ Data = dict[str, list[LaboratoryPour]]
 Say = Callable[[str], None]
 
 TRIES = 3
-"""Times that a laboratory pours ``REPLICATES`` more to replace pours that jammed."""
+"""Batches of ``REPLICATES`` pours that a laboratory tries at most, to replace pours that jammed."""
 OFFERS = (SCALARS, SCAN)
-"""Kinds of data by which every set is judged."""
+"""Kinds of data by which every data set is judged."""
 NAN = float("nan")
 SETS = "sets.jsonl"
 ROUNDS = 4
-"""Rounds of reference pours for a laboratory that has none: 48 pours of each effect, strengths to some 8 %."""
+"""Rounds of reference pours for a laboratory that has none: 48 pours of each effect, strengths known to some 8 %."""
 
 
 @dataclass(frozen=True)
 class CampaignOrder:
-    """What is asked for.
+    """Settings of a campaign.
 
-    minutes: stop after so long, infinite by default; 0: judge nothing. scheduler: of Dask, whose workers pour.
-    shard: every ``of``-th set from the ``shard``-th on. wide: sets of all strengths, for development. follow_up:
-    whether what an answer asks for is measured, which takes most of the time. cases: instead of the schedule's.
-    strengths: instead of those by the laboratory's reference pours.
+    minutes: time limit, infinite by default; 0: judge nothing. scheduler: address of the Dask scheduler whose workers
+    pour. shard: take every ``of``-th set, starting with the ``shard``-th. wide: sets of all strengths, for development.
+    follow_up: whether the measurements that an answer asks for are made, which takes most of the time. cases: replace
+    the scheduled ones. strengths: replace those measured by the laboratory's reference pours.
     """
 
     out: Path
@@ -80,7 +80,7 @@ class CampaignOrder:
     strengths: Strengths | None = None
 
     def asked(self, laboratory: Laboratory) -> tuple[Case, ...]:
-        """The data sets."""
+        """The cases of this shard."""
         kinds = possible_outside(laboratory.declared.scene, development=self.wide)
         found = self.cases or tuple(cases(self.root, self.number, kinds, self.wide))
         return found[self.shard - 1 :: self.of]
@@ -88,14 +88,14 @@ class CampaignOrder:
 
 @dataclass(frozen=True)
 class Judged:
-    """The row of a data set, and what to measure next where the answer is ambiguous."""
+    """The row of a data set, and what to measure next if the answer is ambiguous."""
 
     row: SetRow
     suggestion: Suggestion | None
 
 
 def run_campaign(order: CampaignOrder, say: Say, listener: CampaignListener | None = None) -> list[SetRow]:
-    """Answer the data sets that ``sets.jsonl`` does not hold yet, until all are there or the time is over."""
+    """Judge the data sets that ``sets.jsonl`` does not hold yet, until all are judged or the time is over."""
     order.out.mkdir(parents=True, exist_ok=True)
     path, laboratory = order.out / SETS, read_laboratory(order.laboratory)
     title, asked = laboratory.declared.title, order.asked(laboratory)
@@ -129,7 +129,7 @@ def run_campaign(order: CampaignOrder, say: Say, listener: CampaignListener | No
 
 
 def measured_strengths(order: CampaignOrder, laboratory: Laboratory, place: WorkPlace, say: Say) -> Strengths:
-    """Amplitudes of given strengths by the laboratory's reference pours, which are made where it has none."""
+    """Amplitudes of given strengths, from the laboratory's reference pours, which are made first if it has none."""
     measurement = laboratory.declared
     declared = declare(measurement, order.effects)
     path = laboratory.reference or order.out / f"reference_{measurement.title}.npz"
@@ -150,14 +150,14 @@ def measured_strengths(order: CampaignOrder, laboratory: Laboratory, place: Work
 
 @dataclass(frozen=True, eq=False)
 class Answers:
-    """The laboratory, what its truths are made of, and where the work is done."""
+    """Answers cases: the laboratory, the strengths that its truths are drawn from, and the place that pours."""
 
     laboratory: Laboratory
     strengths: Strengths
     place: WorkPlace
     budget: Budget
     follow_up: bool = True
-    """Whether what an answer asks for is measured."""
+    """Whether the measurements that an answer asks for are made."""
 
     @property
     def measurement(self) -> Measurement:
@@ -180,7 +180,7 @@ class Answers:
         return rows
 
     def judged(self, truth: Truth, data: Data, offer: str) -> SetRow:
-        """The row of a data set that is written to a folder and read like any other, with a follow-up if one is due."""
+        """The row of a data set, written to a folder and read like any other, after the follow-up if one is due."""
         seed = (ROOT, *truth.case.seed)
         rng = np.random.default_rng([*seed, 1])
         scanner = Scanner.drawn(rng, self.laboratory.scanner) if offer == SCAN else None
@@ -206,7 +206,10 @@ class Answers:
     def judged_data(
         self, measurement: Measurement, truth: Truth, offer: str, follow_up: Measurement | None = None
     ) -> Judged:
-        """The row of a data set, and what to measure next; of ``truth`` only the label gets into it."""
+        """The row of a data set, and what to measure next.
+
+        The diagnosis does not see ``truth``, which only fills and scores the row.
+        """
         declared, say = self.strengths.declared, _silent
         if follow_up is not None:
             measurement = joined(measurement, follow_up)
@@ -261,8 +264,8 @@ class Answers:
     def followed_up(
         self, truth: Truth, asked: Suggestion, scanner: Scanner | None, occasion: str = "next"
     ) -> Measurement | None:
-        """What the laboratory measures in the set-up that it is asked for, and of single bodies; None where its pours
-        keep breaking off.
+        """The laboratory's measurements in the set-up that is asked for, and of single bodies; None if its pours keep
+        breaking off.
         """
         place = next(c for c, one in enumerate(self.measurement.conditions) if one.name == asked.condition)
         condition = self.measurement.conditions[place]
@@ -278,7 +281,7 @@ class Answers:
             rng = np.random.default_rng([ROOT, *truth.case.seed, 3])
             bodies = table_of_bodies(order.scene, asked.bodies, rng, order.drawn)
         with TemporaryDirectory() as folder:
-            # The table of a changed condition reads like that of the condition itself; only its set-up is another one.
+            # The table of a changed condition has the format of the condition's own; only the set-up differs.
             self.laboratory.hand_out(Path(folder), data, scanner, (ROOT, *truth.case.seed, 2), bodies)
             measurement = load_measurement(Path(folder), follow_up=True)
         return replace(measurement, conditions=tuple(as_suggested(read, asked) for read in measurement.fit))
@@ -286,9 +289,9 @@ class Answers:
     def measured(
         self, truth: Truth, conditions: Sequence[Condition], occasion: str = "", pours: int = REPLICATES
     ) -> Data | None:
-        """A laboratory's ``pours`` in each condition; None where there is no such truth, or they keep breaking off.
+        """A laboratory's ``pours`` in each condition; None if there is no such truth, or if pours keep breaking off.
 
-        ``occasion``: another one has other seeds.
+        ``occasion``: each has its own seeds.
         """
         if truth.missing:
             return None
@@ -302,7 +305,7 @@ class Answers:
         return None
 
     def orders(self, truth: Truth, condition: Condition, numbers: Sequence[int], occasion: str = "") -> list[PourOrder]:
-        """Pours ``numbers`` of a laboratory in a condition; their seeds follow from root and number of the set."""
+        """Orders of a laboratory's pours ``numbers`` in a condition; seeds follow from the set's root and number."""
         paths = [parameter.path for parameter in self.measurement.parameters]
         laboratory = ModelPours([condition], paths, self.place.store, self.place.pours, root=ROOT)
         name = f"set {truth.case.root}.{truth.case.number} {condition.name}{occasion}"
@@ -311,7 +314,7 @@ class Answers:
         return [PourOrder(laboratory.scene(p, 0), laboratory.seed(p, 0), condition, outside) for p in points]
 
     def out_of_reach(self, truth: Truth, offer: str) -> SetRow:
-        """The row of a truth that cannot be, or whose pours keep breaking off."""
+        """The row of a truth that is impossible, or whose pours keep breaking off."""
         verdict = OUT_OF_REACH + (truth.missing or "pours break off")
         case, title = truth.case, self.measurement.title
         return SetRow(
@@ -334,13 +337,13 @@ class Answers:
 
 
 def label_of(truth: Truth) -> str:
-    """The name that a right answer gives, that of the outside effect, or "none"."""
+    """The name that a right answer gives, the name of the outside effect, or "none"."""
     names = sorted(name for name, _ in truth.effects)
     return "+".join(names) or truth.case.label or NONE
 
 
 def amplitude_text(truth: Truth) -> str:
-    """Amplitudes of the truth's effects, natural units."""
+    """Amplitudes of the truth's effects as text, natural units."""
     return " ".join(f"{name}={'/'.join(f'{x:.4g}' for x in a)}" for name, a in truth.effects)
 
 

@@ -1,10 +1,10 @@
 """The rule of the diagnosis, cross-validated on reference pours: how often it names the right effect, beside the limit.
 
-In every split some pours teach the models and others, disjoint from them, are data: six of an effect at its reference
-amplitude or at half of it, or six of the base model. Nothing is poured, so a rule can be tried in seconds. Each effect
-is taught by some pours at its reference amplitude. Those that the posterior then leaves in question may be taught by
-more, at the one of the two amplitudes that is nearer to their best fit, and are judged again, ``LOOKS`` times at most.
-(The models are taught with the parameters at their means, and so are the data; both come from one solver.)
+In every split some pours teach the models, and others, disjoint from them, are data: six of an effect at its reference
+amplitude or at half of it, or six of the base model. Nothing is poured, so a rule can be tested in seconds. Each effect
+is first taught by pours at its reference amplitude. Effects that the posterior leaves in question may be taught by more
+pours, at whichever of the two amplitudes is nearer to the best fit, and are judged again, ``LOOKS`` times at most.
+(Teaching pours and data both have the parameters at their means and come from one solver.)
 """
 
 from __future__ import annotations
@@ -25,34 +25,34 @@ from doe.validation.reference import SIDE, Blocks, ReferencePours
 FloatArray = npt.NDArray[np.float64]
 
 BASE_POURS = 24
-"""Pours of the base model that teach."""
+"""Teaching pours of the base model."""
 NULLS = 4
-"""Data sets of the base model in a split."""
+"""Data sets of the base model in each split."""
 IN_QUESTION = 0.01
-"""Probability of an effect from which on it is in question."""
+"""Probability above which an effect is in question."""
 BEHIND = 4.0
-"""Log evidence by which a direction may be behind the best one of its effect and be in question with it."""
+"""Log density by which a direction may fall short of its effect's best direction and still be in question."""
 LOOKS = 2
-"""Times that what is in question is taught by more pours."""
+"""Times that effects in question are taught by more pours, at most."""
 LEVELS = {"strong": 1.0, "weak": 0.5}
 """Amplitudes of reference pours, in units of the reference amplitude."""
 
 
 @dataclass(frozen=True)
 class Teaching(Record):
-    """Pours of every direction of an effect in each condition, and more of each that is in question after a look."""
+    """Teaching pours per condition of every direction of an effect, and extra ones of each direction in question."""
 
     all: int
     more: int
 
     def most(self, level: str) -> int:
-        """Pours of ``level`` that may teach."""
+        """Largest number of pours of ``level`` that may teach."""
         return self.more + (self.all if level == "strong" else 0)
 
 
 @dataclass(frozen=True)
 class PlantedTruth(Record):
-    """What acts in data: a direction at one of ``LEVELS``, so strong [σ] on the ruler."""
+    """What acts in a data set: a direction at one of ``LEVELS``, and its ``strength`` on the ruler [σ]."""
 
     kind: DataKind
     level: str
@@ -61,28 +61,28 @@ class PlantedTruth(Record):
 
 @dataclass(frozen=True)
 class CrossValidation(Record):
-    """What the rule answers to data with an effect of a range of strengths.
+    """Answers of the rule to data with an effect, in one range of strengths.
 
     Attributes
     ----------
     data, teaching
-        Kind of data, and what teaches.
+        Kind of data, and teaching pours.
     strength
-        Mean of the data sets' on the ruler [σ].
+        Mean strength of the data sets on the ruler [σ].
     sets, nulls
-        Data sets with an effect and without.
+        Numbers of data sets with and without an effect.
     pours
-        More pours of effects in question, in each condition; mean over the sets.
+        Extra pours of effects in question, in each condition; mean over the sets.
     right
         Share of the sets in which the most probable effect is the right one.
     named
-        Share named rightly where at most each of ``RISKS`` of the sets gets a wrong name.
+        Share named rightly when at most each of ``RISKS`` of the sets gets a wrong name.
     thresholds
-        Probability from which on one names at each risk; above one where none may be named.
+        Lowest probability at which an effect is named, for each risk; above one if none may be named.
     false
-        Sets without an effect in which one is named at the threshold of each risk.
+        Number of sets without an effect in which one is named, at the threshold of each risk.
     by_effect
-        Share of each effect whose most probable name is right.
+        For each effect, share of its sets in which the most probable effect is the right one.
     """
 
     data: str
@@ -114,26 +114,27 @@ def cross_validated(
     splits: int,
     rng: np.random.Generator,
 ) -> list[CrossValidation]:
-    """Judge by the rule on ``splits`` splits of ``sample``.
+    """Apply the rule to ``splits`` random splits of ``sample``.
 
     Parameters
     ----------
     data
-        What the features of ``sample`` are called.
+        Kind of data: name of the features of ``sample``.
     sample
-        Reference pours; of "base" at least ``BASE_POURS`` + 6 x ``NULLS``, of what is data enough for both.
+        Reference pours; of "base" at least ``BASE_POURS`` + 6 x ``NULLS``, of every truth enough to teach and to be
+        data.
     kinds
-        The directions that teach.
+        The directions that are taught.
     bands
-        What is data, by range of strengths; data without an effect are the same for all.
+        Truths of the data sets, by range of strengths; all bands share the data sets without an effect.
     teaching
-        Pours that teach.
+        Numbers of teaching pours.
     splits, rng
-        How often, and the random numbers of the splits.
+        Number of splits, and the generator that draws them.
 
     Returns
     -------
-    What came out, band by band.
+    The result of each band.
     """
     ways = tuple(Way(kind.effect, kind.name) for kind in kinds)
     answers: list[list[_Answer]] = [[] for _ in bands]
@@ -142,7 +143,7 @@ def cross_validated(
         mixed = {
             kind: tuple(block[rng.permutation(len(block))] for block in blocks) for kind, blocks in sample.pours.items()
         }
-        # What never varies in the pours that teach cannot be weighed.
+        # Features that are constant in the teaching pours cannot be weighed.
         keep = ReferencePours({"base": _first(mixed["base"], BASE_POURS)}, ()).vary()
         split = _Split(ReferencePours(mixed, sample.parameters).only(keep), ways, teaching)
         for own, truths in zip(answers, bands, strict=True):
@@ -158,7 +159,7 @@ def cross_validated(
 
 
 class _Split:
-    """Reference pours of which the first ones of each kind teach; data are taken behind those that might."""
+    """One split: the first reference pours of each kind may teach, and data are taken from those after them."""
 
     def __init__(self, sample: ReferencePours, ways: tuple[Way, ...], teaching: Teaching) -> None:
         self.pours = sample.pours
@@ -171,12 +172,12 @@ class _Split:
         self._first = self._taught({(way, "strong"): teaching.all for way in range(len(ways))})
 
     def data_of(self, truth: PlantedTruth) -> Blocks:
-        """A data set that no model has been taught by."""
+        """A data set of ``truth``, from pours that teach no model."""
         first = self._teaching.most(truth.level)
         return tuple(block[first : first + REPLICATES] for block in self.pours[f"{truth.kind.name} {truth.level}"])
 
     def judged(self, data: Blocks) -> tuple[Posterior, int]:
-        """The posterior after all looks, and the pours that were asked for on the way."""
+        """The posterior after all looks, and the number of extra pours that were asked for."""
         counts = {(way, "strong"): self._teaching.all for way in range(len(self._ways))}
         emulator, asked = self._first, 0
         found = posterior(emulator, Data(emulator.seen(data), REPLICATES), pairs=False)
@@ -192,7 +193,7 @@ class _Split:
         return found, asked
 
     def _in_question(self, found: Posterior) -> list[tuple[int, str]]:
-        """Directions, with the level nearer to their best fit of which there are pours."""
+        """Directions in question, each with the level nearest to its best fit of which there are pours."""
         best: dict[str, float] = {}
         for level in found.levels:
             effect = self._ways[level.way].effect
@@ -216,7 +217,7 @@ class _Split:
 
 
 def _lesson(blocks: Blocks, theta: FloatArray, way: int = -1, amplitude: float = 0.0) -> Lessons:
-    """Pours with parameters ``theta`` (k,); conditions have the same number of them."""
+    """Lessons from pours with parameters ``theta`` (k,), cut to the same number in every condition."""
     n = min(map(len, blocks))
     return Lessons(
         np.tile(theta, (n, 1)), np.full(n, way), np.full(n, amplitude), np.ones(n, bool), tuple(b[:n] for b in blocks)

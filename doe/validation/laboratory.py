@@ -1,8 +1,8 @@
 """A made-up laboratory: what it declares, and the folder of data that it hands out.
 
-Its file is written as ``measurement.toml`` (``doe/measurement/load.py``), without data, and with one table more,
-``[laboratory]`` (:class:`LaboratoryTable`). Beside the table of numbers it hands out scans of its piles, made by a
-scanner of its own, and in a follow-up what its balance, caliper and plate tell of single bodies.
+Its file has the format of ``measurement.toml`` (``doe/measurement/load.py``), without data and with an additional table
+``[laboratory]`` (:class:`LaboratoryTable`). Beside the table of numbers the laboratory hands out scans of its piles,
+made by its own scanner, and in a follow-up measurements of single bodies by balance, caliper and plate.
 """
 
 import dataclasses
@@ -39,38 +39,40 @@ from solver import (
 Array = npt.NDArray[np.float64]
 
 TREFOILS = Path(__file__).parent / "laboratories/trefoils/laboratory.toml"
-"""The shipped one."""
+"""The laboratory file that is shipped."""
 LOTS, IN_LOT, MEASURED = 5, 10, 30
 """Fifty bodies are weighed in five lots of ten, thirty are measured along their longest dimension."""
 BALANCE, CALIPER = 0.003, 0.005
-"""Standard deviation of the error of all weighings together, and of all lengths, relative."""
+"""Relative standard deviation of the error common to all weighings, and of that common to all lengths."""
 BY_HAND = 0.01
-"""Standard deviation of a single length that a caliper is read to, relative."""
+"""Relative standard deviation of the error of a single caliper reading."""
 ON_PLATE = 10
-"""Bodies that are pulled over a plate, and dropped."""
+"""Number of bodies that are pulled over a plate, and number that are dropped."""
 PULLED, SHEET, DROPPED, FILM = 0.1, 0.035, 0.04, 0.01
-"""Standard deviation of a single pull, and of all together (the spring balance, and the plate's sheet, which is another
-one than the rig's), relative; of a single restitution, and of all together."""
+"""Standard deviations of errors: of a single pull, and common to all pulls (the spring balance, and the plate's sheet,
+which is not the rig's own), relative; of a single restitution, and common to all restitutions."""
 
 
 class LaboratoryTable(TomlTable):
-    """``[laboratory]``: what is read off every pour, and by what."""
+    """``[laboratory]``: what is read off every pour, and by which scanner."""
 
     readings: Annotated[tuple[str, ...], Names()]
-    """Numbers that it reads off every pour."""
+    """Observables that the laboratory reads off every pour."""
     reference: str | None = None
-    """Pours that tell how strong an effect is, as ``explorer limit`` writes them: beside the file, or shipped; without
-    it the campaign makes them first."""
+    """File of reference pours, which measure the strength of effects, as ``explorer limit`` writes it: beside this
+    file, or shipped. Without it the campaign makes the pours first."""
     scanner: ScannerRanges = ScannerRanges()
 
 
 Reading = Mapping[str, float]
-"""Observable → value of one pour; NaN where it cannot be read."""
+"""Observable → value in one pour; NaN if it cannot be read."""
 
 
 @dataclass(frozen=True)
 class LaboratoryPour:
-    """One pour as the laboratory has it: its readings, and the spheres (m, 3) and (m,) [m] that a scanner sees."""
+    """One pour as the laboratory has it: its readings, and the centres (m, 3) and radii (m,) [m] of the spheres that a
+    scanner sees.
+    """
 
     reading: Reading
     centre: Array
@@ -79,18 +81,18 @@ class LaboratoryPour:
 
 @dataclass(frozen=True)
 class Laboratory:
-    """What a laboratory's file says.
+    """The content of a laboratory's file.
 
     Attributes
     ----------
     path
         The file.
     table
-        Of it all but ``[laboratory]``.
+        Its content without ``[laboratory]``.
     readings
-        Observables that it reads off every pour.
+        Observables that the laboratory reads off every pour.
     scanner
-        What its scanners may be.
+        Ranges of the properties of its scanners.
     reference
         File of reference pours, or None.
     """
@@ -103,7 +105,7 @@ class Laboratory:
 
     @cached_property
     def declared(self) -> Measurement:
-        """The declared model with all its conditions; the values in them are placeholders, which nothing may read."""
+        """The declared model with all its conditions; their values are placeholders, which nothing may use."""
         placeholders = [dict.fromkeys(self.readings, 0.0), dict.fromkeys(self.readings, 1.0)]
         with TemporaryDirectory() as folder:
             try:
@@ -112,7 +114,7 @@ class Laboratory:
                 )
                 return load_measurement(Path(folder))
             except MeasurementError as error:
-                # What is wrong stands in the laboratory's file, whatever copy of it was read.
+                # The mistake is in the laboratory's file, not in the copy that was read.
                 text = str(error).replace(str(Path(folder) / "measurement.toml"), str(self.path))
                 raise MeasurementError(text) from None
 
@@ -125,8 +127,8 @@ class Laboratory:
     ) -> None:
         """Write a data set into an existing ``folder``.
 
-        ``measured``: condition → readings of its pours. ``scan``: what stands in every condition of its scans.
-        ``bodies``: the table of single bodies.
+        ``measured``: condition → readings of its pours. ``scan``: the table on its scans that every condition gets.
+        ``bodies``: the table of measurements of single bodies.
         """
         conditions: list[dict[str, Any]] = []
         for entry in self.table.get("condition", []):
@@ -151,9 +153,9 @@ class Laboratory:
         seed: Sequence[int],
         bodies: str = "",
     ) -> None:
-        """Write a data set of pours into an existing ``folder``, with scans where there is a ``scanner``.
+        """Write a data set of pours into an existing ``folder``, with scans if there is a ``scanner``.
 
-        ``bodies``: the table of what was measured of single bodies.
+        ``bodies``: the table of measurements of single bodies.
         """
         readings = {name: [sample.reading for sample in samples] for name, samples in measured.items()}
         self.write(folder, readings, scanner.table() if scanner else None, bodies)
@@ -172,12 +174,12 @@ class Laboratory:
 
 
 def read_laboratory(path: Path) -> Laboratory:
-    """The laboratory that the file ``path`` describes.
+    """Read the laboratory that the file ``path`` describes.
 
     Raises
     ------
     MeasurementError
-        One line naming file, key, value and what is allowed.
+        One line that names the file, the key, its value, and what is allowed.
     """
     if not path.is_file():
         raise MeasurementError(f"{path}: no such file")
@@ -213,10 +215,11 @@ def table_of_bodies(
     rng: np.random.Generator,
     drawn: Callable[[float], float] = lambda height: 0.0,
 ) -> str:
-    """The table of what is ``asked``, component and quantity, of the bodies that ``scene`` pours, effects in it.
+    """CSV table of measurements of the bodies that ``scene`` pours, under its effects.
 
-    Means, and standard errors from the scatter of lots or bodies and what the instrument itself may be off. ``drawn``:
-    by how much [weights] something that is not in ``scene`` draws a body to a plate, its centre at a height [m].
+    ``asked``: component and quantity of each measurement. The table gives means, and standard errors from the scatter
+    of lots or bodies and from the error of the instrument itself. ``drawn``: height of a body's centre [m] → force
+    [weights] by which something that is not in ``scene`` draws the body to a plate.
     """
     bodies = {body.name: body for body in actual(scene).bodies}
     lines = ["body,quantity,unit,mean,standard_error"]
@@ -233,7 +236,7 @@ def table_of_bodies(
 
 
 def _scales(body: Body, number: int, rng: np.random.Generator) -> Array:
-    """Linear sizes of ``number`` bodies over the declared one."""
+    """Linear sizes of ``number`` bodies, relative to the declared one, (number,)."""
     return np.asarray(body.sizes.quantile(rng.uniform(size=number)), dtype=np.float64)
 
 
@@ -249,7 +252,7 @@ def _lengths(body: Body, rng: np.random.Generator) -> dict[str, tuple[str, float
     lengths *= 1.0 + CALIPER * rng.standard_normal()
     mean, deviation = float(lengths.mean()), float(lengths.std(ddof=1))
     spread = math.sqrt(max(0.0, (deviation / mean) ** 2 - BY_HAND**2))
-    # Of a small spread the square is known, not the root: what the hand adds may hide it.
+    # Of a small spread the square has a known error, not the root: the scatter of readings may hide it.
     square = (deviation / mean) ** 2 * math.sqrt(2.0 / (MEASURED - 1))
     return {
         "length": ("m", mean, math.hypot(deviation / math.sqrt(MEASURED), CALIPER * mean)),
@@ -260,7 +263,7 @@ def _lengths(body: Body, rng: np.random.Generator) -> dict[str, tuple[str, float
 def _on_plate(
     scene: Scene, body: Body, tests: Sequence[str], rng: np.random.Generator, drawn: Callable[[float], float]
 ) -> dict[str, tuple[str, float, float]]:
-    from solver import PlateTest, plate_tests  # they bring Taichi
+    from solver import PlateTest, plate_tests  # they import Taichi
 
     truths = plate_tests([PlateTest(scene, body.name, test) for test in tests])
     clump = body.clump

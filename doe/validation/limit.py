@@ -1,31 +1,32 @@
-"""How often the right effect can be named at all: the Bayes limit of data of a kind, whatever the method.
+"""How often the right effect can be named at all: the Bayes limit of a kind of data, whatever the method.
 
-With signatures that are known exactly, the shift of a data set in whitened units is z = s u_e + N(0, I), where u_e is
-the direction of the effect that acts and s its strength. All that z tells of the models is t_f = u_f·z, which is normal
-with mean s C_fe and covariance C, the matrix of the signatures' cosines. The evidence for f against nothing is
+If the signatures are known exactly, the whitened shift of a data set is z = s u_e + N(0, I), where u_e is the direction
+of the effect that acts and s its strength. All that z tells about the models is in t_f = u_f·z, which is normal with
+mean s C_fe and covariance C, the matrix of the signatures' cosines. The evidence for f against nothing is
 
     Z_f = ∫ exp(b t_f − b²/2) p(b) db,    p(b) ∝ 1/b on ``LEAST`` … ``MOST`` standard errors
 
-and mirror images of an effect that has a direction share its prior. Whoever names the effect of the largest posterior,
-if that is at least τ, names as often as can be at every risk of a wrong name: the risk–coverage curve. On average over
-the prior no rule that uses the same numbers does better; one that seems to has been given more than the data.
+Mirror images of an effect that has a direction share its prior. The rule that names the effect of the largest posterior
+if that is at least τ names the most effects at every risk of a wrong name: the risk–coverage curve. On average over the
+prior no rule that uses the same numbers does better; a rule that seems to has been given more than the data.
 
-**The ruler** of this project, by which an effect is said to be 6 σ strong, is its shift of the means of a data set, in
-standard errors, free of what noise adds to it, in the scalars of the fitted conditions at ``REPLICATES`` pours each:
+**The ruler** of this project, by which an effect is said to be 6 σ strong, is the effect's shift of the means of a data
+set, in standard errors and without the contribution of noise, in the scalars of the fitted conditions at ``REPLICATES``
+pours each:
 
     d² = δᵀ M δ,    M = (Σ/n + J Jᵀ)⁻¹
 
-δ is the shift of the features of all fitted conditions, Σ the covariance of one pour (block by condition), n the pours
-of a data set in each condition, and J what each parameter does per standard deviation of its independent measurement:
-a shift that recalibration can make counts for little. A plain d² of estimated means is too large by their noise. The
-shifts of separate folds of pours have separate noise, so products between folds only are free of that (crossnobis:
-Diedrichsen et al. 2016, arXiv 1607.01371, eq. 9):
+δ is the shift of the features of all fitted conditions, Σ the covariance of one pour (one block per condition), n the
+number of pours of a data set in each condition, and J the change by each parameter per standard deviation of its
+independent measurement: a shift that recalibration can absorb counts for little. A plain d² of estimated means is too
+large by their noise. Shifts of separate folds of pours have independent noise, so products between different folds are
+free of that bias (crossnobis: Diedrichsen et al. 2016, arXiv 1607.01371, eq. 9):
 
     d² = [ (Σ_f δ_f)ᵀ M (Σ_f δ_f) − Σ_f δ_fᵀ M δ_f ] / (F (F − 1))
 
-Its standard error is that of two jackknives over the folds in quadrature: of the shift in a metric that stands, and of
-the metric, whose Σ and J are estimated as well, under a shift that stands (the mean and the covariance of normal pours
-are independent). Σ is shrunk to its diagonal as far as its own scatter asks for (Schäfer & Strimmer 2005, doi
+Its standard error adds two jackknives over the folds in quadrature: one of the shift with the metric held fixed, and
+one of the metric, whose Σ and J are also estimated, with the shift held fixed (mean and covariance of normal pours are
+independent). Σ is shrunk to its diagonal as far as its own scatter requires (Schäfer & Strimmer 2005, doi
 10.2202/1544-6115.1175).
 """
 
@@ -51,17 +52,17 @@ FloatArray = npt.NDArray[np.float64]
 
 FOLDS = 8
 LEAST, MOST = 1.5, 20.0
-"""Range of an amplitude's prior, in standard errors on the ruler (scalars, six pours)."""
+"""Range of the prior of an amplitude, in standard errors on the ruler (scalars, six pours)."""
 NODES = 24
-"""Amplitudes over which the evidence is summed."""
+"""Number of amplitudes over which the evidence is summed."""
 NOTHING = 0.5
-"""Prior that nothing is missing; effects share the rest alike."""
+"""Prior probability that nothing is missing; the effects share the rest equally."""
 RISKS = (0.003, 0.01, 0.03, 0.1)
-"""Shares of wrong names among the sets of a strength at which a coverage is stated."""
+"""Shares of sets of a strength with a wrong name at which the coverage is stated."""
 RISK = 0.03
-"""The one of them at which an effect's own share is stated."""
+"""The one of ``RISKS`` at which the share of each single effect is stated."""
 SETS = 4000
-"""Made-up data sets of each effect and strength."""
+"""Number of made-up data sets of each effect and strength."""
 STRENGTHS = (4.0, 6.0, 10.0)
 """Strengths [σ] for which limits are stated."""
 CLASS = 0.95
@@ -70,18 +71,18 @@ CLASS = 0.95
 
 @dataclass(frozen=True)
 class Metric:
-    """``whitening`` W with M = Wᵀ W, so that shifts in its units have unit noise; (k, D), zero where nothing varies."""
+    """``whitening`` W (k, D) with M = Wᵀ W, so that W δ has unit noise; zero for features that do not vary."""
 
     whitening: FloatArray
 
     def white(self, shifts: FloatArray) -> FloatArray:
-        """Shifts (..., D) in standard errors of a data set."""
+        """``shifts`` (..., D) in standard errors of a data set, (..., k)."""
         return np.asarray(shifts @ self.whitening.T, dtype=np.float64)
 
 
 @dataclass(frozen=True)
 class Ruler:
-    """The ``metric`` of all reference pours, and, for its error, those ``without`` each of the folds."""
+    """The ``metric`` of all reference pours, and the metrics ``without`` each of the folds, for its error."""
 
     metric: Metric
     without: tuple[Metric, ...]
@@ -113,9 +114,9 @@ class Signatures(Record):
     names
         Directions of effects.
     ruler, strength
-        Strength of each direction's stronger reference amplitude in the scalars at six pours, and in these features.
+        Strength of each direction's stronger reference amplitude, in the scalars at six pours and in these features.
     cosines
-        (k, k), of unit diagonal.
+        Cosines of all pairs of signatures, (k, k), with unit diagonal.
     """
 
     names: tuple[str, ...]
@@ -126,18 +127,18 @@ class Signatures(Record):
 
 @dataclass(frozen=True)
 class Reached(Record):
-    """What one direction of an effect does at its reference amplitude.
+    """Strength of one direction of an effect at its reference amplitude.
 
     Attributes
     ----------
     kind
         The direction.
     amplitude
-        Natural units.
+        The reference amplitude, natural units.
     ruler, weak
-        Strength on the ruler at that amplitude and, of an effect's first direction, at half of it.
+        Strength on the ruler at that amplitude and, for the first direction of an effect, at half of it.
     strength
-        Strength by kind of data, six pours.
+        Strength at six pours, by kind of data.
     """
 
     kind: DataKind
@@ -159,7 +160,7 @@ class Confusable(Record):
 
 @dataclass(frozen=True)
 class LimitRow(Record):
-    """The limit for one kind of data, so many pours in each condition, and one strength."""
+    """The limit for one kind of data, one number ``replicates`` of pours in each condition, and one strength."""
 
     data: str
     replicates: int
@@ -168,18 +169,18 @@ class LimitRow(Record):
 
 @dataclass(frozen=True)
 class LimitStudy(Record):
-    """What data of each kind can tell of the effects of a declared model, at best.
+    """The most that data of each kind can tell about the effects of a declared model.
 
     Attributes
     ----------
     pours
-        Reference pours that count, by what acts, summed over the conditions.
+        Number of usable reference pours, by what acts in them, summed over the conditions.
     reached
         Directions of effects, with their strengths.
     confusable
-        All pairs, by kind of data and the most alike first.
+        All pairs, by kind of data, the most alike first.
     rows
-        Limits; none of data in which no effect is told from zero.
+        Limits; none for data in which no effect can be told from zero.
     """
 
     pours: Mapping[str, int]
@@ -190,20 +191,20 @@ class LimitStudy(Record):
 
 @dataclass(frozen=True)
 class Limit(Record):
-    """What can be reached for the effects of one strength.
+    """The limit for effects of one strength.
 
     Attributes
     ----------
     strength
-        On the ruler [σ].
+        Strength on the ruler [σ].
     right
         Share of sets in which the most probable effect is the right one, given that one acts.
     named
-        The risk–coverage curve: share that is named rightly where at most each of ``RISKS`` gets a wrong name.
+        The risk–coverage curve: share of sets named rightly when at most each of ``RISKS`` gets a wrong name.
     threshold
-        Posterior probability at which ``RISK`` is kept.
+        Lowest posterior probability for a name that keeps to ``RISK``.
     by_effect
-        Share of each effect that is named rightly at that threshold.
+        For each effect, share of its sets named rightly at that threshold.
     """
 
     strength: float
@@ -225,14 +226,14 @@ def limit_study(
     levels
         The directions of effects that were poured, at their reference amplitudes.
     offered
-        Kind of data → how many of the first features of each condition it gives; the first kind is the ruler's.
+        Kind of data → number of leading features that it gives in each condition; the first kind is the ruler's.
     seed
-        Of the made-up data sets.
+        Seed of the made-up data sets.
 
     Returns
     -------
-    Strengths, the pairs that are most alike, and for each kind of data what can be named at each of ``STRENGTHS``,
-    with the data's pours and with as many again.
+    Strengths, the pairs that are most alike, and the limit for each kind of data at each of ``STRENGTHS``, with the
+    pours of the data and with twice as many.
     """
     kinds = [DataKind(one.direction.effect, one.direction.name, len(one.direction.full) == 2) for one in levels]
     names = [f"{one.name} strong" for one in kinds]
@@ -266,10 +267,10 @@ def limit_of(
 ) -> Limit | None:
     """The limit for effects that are ``strength`` σ strong on the ruler.
 
-    ``kinds``: what each of ``found.names`` is; only those whose strengths are known to be above zero take part. None
-    where there is none.
+    ``kinds``: the direction of each of ``found.names``. Only those whose strength is known to be above zero take part;
+    None if there are none.
     """
-    # How much stronger than on the ruler an effect is in these features.
+    # Ratio of an effect's strength in these features to that on the ruler.
     gain = np.array(
         [s.value / r.value if r.value > 0.0 else 0.0 for s, r in zip(found.strength, found.ruler, strict=True)]
     )
@@ -296,7 +297,7 @@ def limit_of(
     order = np.argsort(-p)
     wrong = np.cumsum((weight * ~correct)[order]) / weight.sum()
     coverage = np.cumsum((weight * correct)[order]) / weight.sum()
-    # The last set that may still be named, at each risk.
+    # Index of the last set that may still be named, at each risk.
     last = np.searchsorted(wrong, RISKS, side="right") - 1
     kept = last[RISKS.index(RISK)]
     threshold = float(p[order[kept]]) if kept >= 0 else float("inf")
@@ -317,7 +318,7 @@ def signatures_of(
 ) -> Signatures:
     """Strengths and cosines of the reference amplitudes ``names`` in the features of ``sample``.
 
-    ``ruler``: their strengths on the ruler. ``replicates``: pours of a data set in each condition.
+    ``ruler``: their strengths on the ruler. ``replicates``: number of pours of a data set in each condition.
     """
     scale = ruler_of(sample, replicates)
     shifts = [scale.metric.white(fold_shifts(sample, name)) for name in names]
@@ -328,19 +329,19 @@ def signatures_of(
 
 
 def ruler_of(sample: ReferencePours, replicates: int = REPLICATES) -> Ruler:
-    """The ruler of data sets of ``replicates`` pours per condition, as :func:`metric_of`."""
+    """The ruler for data sets of ``replicates`` pours per condition; arguments as in :func:`metric_of`."""
     return Ruler(metric_of(sample, replicates), tuple(metric_of(_without(sample, f), replicates) for f in range(FOLDS)))
 
 
 def metric_of(sample: ReferencePours, replicates: int = REPLICATES) -> Metric:
-    """The metric of data sets of ``replicates`` pours per condition.
+    """The metric for data sets of ``replicates`` pours per condition.
 
     Parameters
     ----------
     sample
         Reference pours; needs "base" and "<parameter> -", "<parameter> +" of every parameter.
     replicates
-        n, pours in each condition.
+        n, number of pours in each condition.
 
     Returns
     -------
@@ -349,7 +350,7 @@ def metric_of(sample: ReferencePours, replicates: int = REPLICATES) -> Metric:
     Raises
     ------
     StatisticsError
-        Where a condition has fewer than three pours of the base model.
+        If a condition has fewer than three pours of the base model.
     """
     for c, base in enumerate(sample.pours["base"]):
         if len(base) < 3:
@@ -361,7 +362,7 @@ def metric_of(sample: ReferencePours, replicates: int = REPLICATES) -> Metric:
     )
     blocks = [shrunk_covariance(_residuals(sample, c)) for c in range(len(sample.pours["base"]))]
     covariance = block_diag(*blocks) / replicates + sensitivity @ sensitivity.T
-    # In units of each feature's standard error: they span ten orders of magnitude.
+    # In units of each feature's standard error, because these span ten orders of magnitude.
     scale = np.sqrt(np.diag(covariance))
     factor = np.linalg.cholesky(covariance / np.outer(scale, scale))
     whitening = np.zeros((len(scale), len(varying)))
@@ -370,7 +371,7 @@ def metric_of(sample: ReferencePours, replicates: int = REPLICATES) -> Metric:
 
 
 def strength_of(sample: ReferencePours, name: str, ruler: Ruler) -> Strength:
-    """Length of the shift by ``name``, zero where its square comes out negative, with its standard error."""
+    """Length of the shift by ``name`` with its standard error; zero if the estimate of its square is negative."""
     shifts = fold_shifts(sample, name)
     white = ruler.metric.white(shifts)
     square = product(white, white)
@@ -378,14 +379,14 @@ def strength_of(sample: ReferencePours, name: str, ruler: Ruler) -> Strength:
     by_shift = _jackknife([product(one, one) for one in (np.delete(white, f, axis=0) for f in range(len(white)))])
     by_metric = _jackknife([product(one, one) for one in (metric.white(shifts) for metric in ruler.without)])
     spread = float(np.hypot(by_shift, by_metric))
-    # Of the square; that of its root by the delta method, and of a root near zero by the root of that.
+    # ``spread`` is the error of the square. That of its root is by the delta method, near zero the root of ``spread``.
     return Strength(value, spread / (2.0 * value) if square > spread else float(np.sqrt(spread)))
 
 
 def fold_shifts(sample: ReferencePours, name: str, folds: int = FOLDS) -> FloatArray:
-    """Shifts of ``name`` off the base model in each of the folds, features' units, (folds, D).
+    """Shifts (folds, D) of ``name`` from the base model in each fold, in the units of the features.
 
-    Raises StatisticsError where a fold would be empty.
+    Raises StatisticsError if a fold would be empty.
     """
     least = min(len(block) for kind in (name, "base") for block in sample.pours[kind])
     if least < folds:
@@ -397,14 +398,14 @@ def fold_shifts(sample: ReferencePours, name: str, folds: int = FOLDS) -> FloatA
 
 
 def product(first: FloatArray, second: FloatArray) -> float:
-    """Crossnobis product of two sets of fold shifts, (folds, D) each: no fold meets itself."""
+    """Crossnobis product of two sets of fold shifts, (folds, D) each: no fold is multiplied by itself."""
     folds = len(first)
     whole = float(first.sum(axis=0) @ second.sum(axis=0))
     return (whole - float((first * second).sum())) / (folds * (folds - 1))
 
 
 def confused(cosine: float, strength: float) -> float:
-    """Probability of taking one of two effects for the other by chance: Φ(−s √((1 − c)/2))."""
+    """Probability of mistaking one of two effects for the other by chance: Φ(−s √((1 − c)/2))."""
     return float(norm.cdf(-strength * np.sqrt(max(0.0, 1.0 - cosine) / 2.0)))
 
 
@@ -420,7 +421,7 @@ def alike(found: Sequence[Signatures]) -> list[tuple[str, str]]:
 
 
 def nearest_correlation(cosines: FloatArray) -> FloatArray:
-    """A matrix of cosines without negative eigenvalues and with a unit diagonal, next to an estimated one."""
+    """A matrix of cosines near the estimated one, without negative eigenvalues and with a unit diagonal."""
     symmetric = np.clip(0.5 * (cosines + cosines.T), -1.0, 1.0)
     np.fill_diagonal(symmetric, 1.0)
     for _ in range(20):
@@ -432,7 +433,7 @@ def nearest_correlation(cosines: FloatArray) -> FloatArray:
 
 
 def _residuals(sample: ReferencePours, condition: int) -> FloatArray:
-    """Deviations from the mean of their kind, of base pours and of those with a parameter moved."""
+    """Deviations of base pours, and of pours with a parameter moved, from the means of their kinds, (n, d)."""
     kinds = ["base", *(f"{name} {side}" for name in sample.parameters for side in "-+")]
     groups = [sample.pours[kind][condition] for kind in kinds]
     # Each group's mean takes a degree of freedom.
@@ -442,13 +443,13 @@ def _residuals(sample: ReferencePours, condition: int) -> FloatArray:
 
 
 def _slope(sample: ReferencePours, parameter: str) -> FloatArray:
-    """What ``parameter`` does per standard deviation of its measurement, (D,)."""
+    """Change (D,) of the features per standard deviation of the measurement of ``parameter``."""
     low, high = sample.pours[f"{parameter} -"], sample.pours[f"{parameter} +"]
     return np.concatenate([(b.mean(axis=0) - a.mean(axis=0)) / (2.0 * SIDE) for a, b in zip(low, high, strict=True)])
 
 
 def _without(sample: ReferencePours, fold: int) -> ReferencePours:
-    """The pours that are not in ``fold``."""
+    """The reference pours that are not in ``fold``."""
     pours = {
         name: tuple(np.delete(block, np.s_[fold::FOLDS], axis=0) for block in blocks)
         for name, blocks in sample.pours.items()
@@ -457,12 +458,12 @@ def _without(sample: ReferencePours, fold: int) -> ReferencePours:
 
 
 def _jackknife(values: Sequence[float]) -> float:
-    """Standard error of an estimate by its ``values`` without each of the folds."""
+    """Jackknife standard error of an estimate, from its ``values`` without each of the folds."""
     return float(np.std(values) * np.sqrt(len(values) - 1))
 
 
 def _fold_means(pours: FloatArray, folds: int) -> FloatArray:
-    """Means of every ``folds``-th pour, (folds, d)."""
+    """Means (folds, d) over folds that each take every ``folds``-th pour."""
     return np.stack([pours[f::folds].mean(axis=0) for f in range(folds)])
 
 
@@ -490,8 +491,8 @@ def _posteriors(
     effects: Sequence[str],
     groups: Sequence[str],
 ) -> FloatArray:
-    """Posterior of nothing and of each effect, (sets, 1 + groups); ``t`` (sets, k)."""
-    b = np.geomspace(LEAST, MOST, NODES)[:, None] * gain  # log-uniform, so nodes weigh alike
+    """Posterior probabilities (sets, 1 + groups) of nothing and of each effect, given ``t`` (sets, k)."""
+    b = np.geomspace(LEAST, MOST, NODES)[:, None] * gain  # log-uniform, so all nodes have equal weight
     logs = []
     for k, both in enumerate(two_sided):
         exponents = b[:, k, None] * t[:, k] - 0.5 * b[:, k, None] ** 2

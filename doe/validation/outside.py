@@ -1,6 +1,6 @@
-"""Effects that no library holds, so that a diagnosis has to say "unexplained": ``OUTSIDE_EFFECTS``, one value each.
+"""Effects that are not in the library, so a diagnosis has to say "unexplained": ``OUTSIDE_EFFECTS``, one value each.
 
-Some are for development, and a test (``truth.py``) has all. Each pour is driven by hand in a process of its own
+Some are for development; a test (``truth.py``) uses all. Each pour is stepped by this module, in a process of its own
 (``work_place``), and gives an ordinary record.
 """
 
@@ -14,40 +14,40 @@ import numpy as np
 from solver import Batch, Members, Pour, Record, Scene, capacity_for, parameters, poured_mass, value, with_values
 
 OUTSIDE = 1
-"""Version of this file: raise it with every change to what one of its pours does."""
+"""Version of this file: increase it with every change to what any of its pours does."""
 PLATE = 0
 """Index of the plate among the funnel rig's surfaces."""
 HALF_PERIOD = 0.01
-"""[s] of the vibration."""
+"""Half period of the vibration [s]."""
 REACH = 0.02
-"""λ of the attraction [m]; it acts up to three times as high."""
+"""Decay length λ of the attraction [m], which acts up to three times that height."""
 KICK = 1e-3
 """Interval [s] at which the attraction acts."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class OutsideEffect:
-    """One effect that the library lacks.
+    """One effect that is not in the library.
 
     Attributes
     ----------
     name
-        Of the files of a campaign.
+        Its name in the files of a campaign.
     amount
-        By how much it acts, in the unit that ``pour`` takes; chosen once, before any diagnosis was asked, so that it
-        moves the summaries by more than 10 standard errors.
+        Its strength, in the unit that ``pour`` takes; chosen once, before any diagnosis was run, so that it moves the
+        summaries by more than 10 standard errors.
     pour
         Scene, seed, amount → the record of a pour in which it acts.
     seen
-        Record, amount → what the laboratory reads instead of that record; None: the record.
+        Record, amount → the record that the laboratory reads instead; None: the record itself.
     development
         Whether a development campaign asks for it.
     has_direction
-        Whether it acts the other way in the frame of a rig that is turned by 180° on its bench.
+        Whether it changes sign in the frame of a rig that is turned by 180° on its bench.
     needs_outlet, needs_clump
-        Whether there has to be a funnel, or bodies of member spheres.
+        Whether it needs a funnel, or bodies of member spheres.
     drawn
-        Height of a body's centre [m], amount → by how much [weights] it draws a single body to a plate.
+        Height of a body's centre [m], amount → force [weights] by which it draws a single body to a plate.
     """
 
     name: str
@@ -67,19 +67,19 @@ class OutsideEffect:
 
 
 def possible_outside(scene: Scene, development: bool = False) -> tuple[str, ...]:
-    """Names of those that can act in ``scene``; ``development``: only of those that are for it."""
+    """Names of the outside effects that can act in ``scene``; ``development``: only those for development."""
     return tuple(
         one.name for one in OUTSIDE_EFFECTS.values() if one.possible(scene) and (one.development or not development)
     )
 
 
 def outside_pour(name: str, scene: Scene, seed: int, amount: float) -> Record:
-    """The record of one pour of ``scene`` in which the outside effect ``name`` acts by ``amount``."""
+    """The record of one pour of ``scene`` in which the outside effect ``name`` acts with strength ``amount``."""
     return OUTSIDE_EFFECTS[name].pour(scene, seed, amount)
 
 
 def driven(scene: Scene, seed: int, act: Callable[[Batch, Pour], None] | None = None, every: float = np.inf) -> Record:
-    """One pour, with ``act`` called every ``every`` seconds at least."""
+    """The record of one pour, with ``act`` called at least every ``every`` seconds."""
     batch = Batch(capacity_for([scene], 1))
     pour = Pour(batch, 0, scene, seed)
     at_most = None if act is None else max(1, round(every / pour.dt))
@@ -91,13 +91,13 @@ def driven(scene: Scene, seed: int, act: Callable[[Batch, Pour], None] | None = 
 
 
 def vibrate(batch: Batch, pour: Pour, speed: float) -> None:
-    """Let the plate go the other way every ``HALF_PERIOD``."""
+    """Move the plate up and down at ``speed`` [m/s], in the opposite direction after every ``HALF_PERIOD``."""
     sign = 1.0 if round(pour.time / HALF_PERIOD) % 2 == 0 else -1.0
     batch.set_motion(0, PLATE, (0.0, 0.0, sign * speed), (0.0, 0.0, 0.0))
 
 
 def attract(batch: Batch, pour: Pour, strength: float) -> None:
-    """The attraction's impulse over ``KICK`` on every body near the plate."""
+    """Apply the attraction's impulse over ``KICK`` to every body near the plate."""
     state = batch.bodies(0, pour.entered)
     for b in np.flatnonzero((state[:, 2] < 3.0 * REACH) & (state[:, 13] > 0.5)):
         velocity = state[b, 7:10].copy()
@@ -106,12 +106,12 @@ def attract(batch: Batch, pour: Pour, strength: float) -> None:
 
 
 def turn(batch: Batch, pour: Pour, rate: float) -> None:
-    """Let the plate turn about the vertical."""
+    """Turn the plate about the vertical at ``rate`` [rad/s]."""
     batch.set_motion(0, PLATE, (0.0, 0.0, 0.0), (0.0, 0.0, rate))
 
 
 def blow(batch: Batch, pour: Pour, acceleration: float) -> None:
-    """The draught's impulse over ``KICK`` on every body that is falling, above the pile and below the outlet."""
+    """Apply the draught's impulse over ``KICK`` to every falling body, above the pile and below the outlet."""
     state = batch.bodies(0, pour.entered)
     outlet = float(value(pour.scene, "rig.outlet_height"))
     for b in np.flatnonzero((state[:, 2] > REACH) & (state[:, 2] < outlet) & (state[:, 13] > 0.5)):
@@ -121,11 +121,11 @@ def blow(batch: Batch, pour: Pour, acceleration: float) -> None:
 
 
 def with_spheres(scene: Scene, share: float) -> Scene:
-    """``scene`` with ``share`` of its mass in spheres of the first body's mass, of the volume of its member spheres."""
+    """``scene`` with ``share`` of its mass in spheres of the first body's mass and its member spheres' total volume."""
     whole = scene.bodies[0]
     assert isinstance(whole.shape, Members)
     radii, mass = np.array(whole.shape.radii), whole.shape.mass
-    # Of bodies whose members hardly overlap.
+    # Valid for bodies whose member spheres hardly overlap.
     radius = float((radii**3).sum() ** (1.0 / 3.0))
     sphere = Members(((0.0, 0.0, 0.0),), (radius,), mass, (0.4 * mass * radius**2,) * 3)
     bodies = (
@@ -136,7 +136,7 @@ def with_spheres(scene: Scene, share: float) -> Scene:
 
 
 def broken(scene: Scene, share: float) -> Scene:
-    """``scene`` with ``share`` of its mass in single lobes of the first body, of the body's mass per lobe."""
+    """``scene`` with ``share`` of its mass in single lobes of the first body, each with the body's mass per lobe."""
     whole = scene.bodies[0]
     assert isinstance(whole.shape, Members)
     radius, mass = whole.shape.radii[0], whole.shape.mass / len(whole.shape.radii)
@@ -149,7 +149,7 @@ def broken(scene: Scene, share: float) -> Scene:
 
 
 def magnified(record: Record, factor: float) -> Record:
-    """``record`` with every length of its pile ``factor`` times as large; the clock and the balance read right."""
+    """``record`` with every length of its pile multiplied by ``factor``; times and masses stay correct."""
     pile = record.pile
     spheres = dataclasses.replace(
         pile.spheres, centre=pile.spheres.centre * factor, radius=pile.spheres.radius * factor
@@ -158,13 +158,13 @@ def magnified(record: Record, factor: float) -> Record:
 
 
 def with_stuck(record: Record, stuck: float) -> Record:
-    """``record`` with ``stuck`` [kg] that entered and never left, and counts as poured."""
+    """``record`` with a mass ``stuck`` [kg] added that entered, never left, and counts as poured."""
     trace = dataclasses.replace(record.trace, entered_mass=record.trace.entered_mass + stuck)
     return dataclasses.replace(record, trace=trace, poured_mass=record.poured_mass + stuck)
 
 
 def _acted_on(act: Callable[[Batch, Pour, float], None], every: float) -> Callable[[Scene, int, float], Record]:
-    """Pours on which ``act`` acts every ``every`` seconds."""
+    """A function that runs pours on which ``act`` acts every ``every`` seconds."""
     return lambda scene, seed, amount: driven(scene, seed, lambda batch, pour: act(batch, pour, amount), every)
 
 
@@ -185,9 +185,9 @@ def _raised(scene: Scene, seed: int, share: float) -> Record:
 OUTSIDE_EFFECTS = {
     one.name: one
     for one in (
-        # The plate goes up and down by a square wave of speed [m/s], 50 Hz.
+        # The velocity of the plate is a vertical square wave [m/s], 50 Hz.
         OutsideEffect(name="vibrating_plate", amount=0.05, pour=_acted_on(vibrate, HALF_PERIOD), development=True),
-        # Bodies near the plate are drawn to it, q m g exp(−z/λ).
+        # Bodies near the plate are drawn to it with the force q m g exp(−z/λ).
         OutsideEffect(
             name="plate_attraction",
             amount=4.0,
@@ -195,7 +195,7 @@ OUTSIDE_EFFECTS = {
             drawn=lambda height, strength: strength * math.exp(-height / REACH),
             development=True,
         ),
-        # Every length that is read off the pile is too large by one factor. The pour is as declared.
+        # Every length read off the pile is too large by the same factor. The pour is as declared.
         OutsideEffect(
             name="misread_scale",
             amount=0.10,
@@ -203,7 +203,7 @@ OUTSIDE_EFFECTS = {
             seen=lambda record, amount: magnified(record, 1.0 + amount),
             development=True,
         ),
-        # A share of the mass is single lobes instead of trefoils.
+        # A share of the mass consists of single lobes instead of trefoils.
         OutsideEffect(
             name="breaking_bodies",
             amount=0.18,
@@ -217,11 +217,11 @@ OUTSIDE_EFFECTS = {
         OutsideEffect(name="turning_plate", amount=2.5, pour=_acted_on(turn, HALF_PERIOD)),
         # Air moves sideways above the plate and drags what falls through it [m/s²].
         OutsideEffect(name="draught", amount=3.0, pour=_acted_on(blow, KICK), has_direction=True, needs_outlet=True),
-        # A share less was weighed in than was written down.
+        # Less mass was weighed in than was recorded, by a share of it.
         OutsideEffect(name="short_charge", amount=0.2, pour=_without),
-        # The funnel stands higher than was written down, by a share of its height.
+        # The funnel stands higher than was recorded, by a share of its height.
         OutsideEffect(name="raised_funnel", amount=0.5, pour=_raised, needs_outlet=True),
-        # A share of the mass is spheres of the bodies' own mass and solid volume.
+        # A share of the mass consists of spheres with the bodies' own mass and solid volume.
         OutsideEffect(
             name="stray_spheres",
             amount=0.3,
@@ -230,4 +230,4 @@ OUTSIDE_EFFECTS = {
         ),
     )
 }
-"""By name, in the order in which a campaign asks for them."""
+"""Outside effects by name, in the order in which a campaign asks for them."""

@@ -1,11 +1,12 @@
-"""Reference pours of a declared model: so many of every effect that what it does to a pile is known, not estimated.
+"""Reference pours of a declared model: so many of every effect that its shift of a pile is known, not estimated.
 
-A ruler and the limit of any diagnosis (both ``limit.py``) are made of them. All pours have the calibrated
-parameters at their measured means; what a parameter does is known from pours ``SIDE`` deviations to either side.
+The ruler and the limit of any diagnosis (both in ``limit.py``) are computed from them. All pours have the calibrated
+parameters at their measured means, except pours ``SIDE`` deviations to either side, which measure each parameter's
+effect.
 
-Pours come in rounds, each of the same number of every kind, so that a reference can be made in pieces and stopped
-after any round. First a pilot finds, for every direction of an effect, the amplitude that shifts the summaries of a
-data set by about 12 standard errors (``training_amplitudes.py``).
+Pours come in rounds with the same number of each kind, so that a reference can be made in pieces and stopped after any
+round. First a pilot finds, for every direction of an effect, the amplitude that shifts the summaries of a data set by
+about 12 standard errors (``training_amplitudes.py``).
 """
 
 from __future__ import annotations
@@ -37,33 +38,34 @@ from solver import npz_arrays
 FloatArray = npt.NDArray[np.float64]
 
 Blocks = tuple[FloatArray, ...]
-"""Per fitted condition the features of the pours, (n_c, d_c)."""
+"""Features of the pours in each fitted condition, (n_c, d_c)."""
 Say = Callable[[str], None]
 
 CONSTANT = 1e-9
-"""Standard deviation, as a share of the feature's size, below which it says nothing."""
+"""Standard deviation of a feature, relative to its size, below which the feature counts as constant."""
 ROOT = 2
-"""Root of the seeds: other pours than those of a diagnosis (0) and of the made-up laboratories (1)."""
+"""Root of the seeds, different from those of a diagnosis (0) and of the made-up laboratories (1)."""
 TRIALS = Trials(pours=6, most=5, enough=10.0, too_much=15.0)
 SIDE = 1.5
-"""Standard deviations by which a parameter is moved; of one that has none, this many sixths of its range."""
+"""Standard deviations by which a parameter is moved; a parameter without one is moved by this many sixths of its
+range."""
 
 FIRST_BASE = 48
-"""Pours of the base model that the pilot takes its covariance from."""
+"""Pours of the base model from which the pilot estimates the covariance."""
 PER_ROUND = {"strong": 8, "weak": 4, "other": 4, "base": 24, "parameter": 4}
 """Pours of each kind in a round: of each effect at either amplitude, of its other directions, of the base model, and of
-each parameter on either side."""
+each parameter on either side of its mean."""
 
 
 @dataclass(frozen=True)
 class ReferencePours:
-    """Reference pours: what acts → blocks of complete pours; ``parameters``: names of those that are calibrated."""
+    """Reference pours: what acts → blocks of complete pours; ``parameters``: names of the calibrated parameters."""
 
     pours: Mapping[str, Blocks]
     parameters: tuple[str, ...]
 
     def first(self, numbers: Sequence[int]) -> ReferencePours:
-        """The same with the first ``numbers[c]`` features of each condition."""
+        """The same pours with the first ``numbers[c]`` features of each condition."""
         return ReferencePours(
             {
                 name: tuple(block[:, :number] for block, number in zip(blocks, numbers, strict=True))
@@ -73,11 +75,11 @@ class ReferencePours:
         )
 
     def varying(self) -> ReferencePours:
-        """The same without features that are constant in the base model's pours."""
+        """The same pours without features that are constant in the base model's pours."""
         return self.only(self.vary())
 
     def vary(self) -> tuple[npt.NDArray[np.bool_], ...]:
-        """Per condition, which features vary in the base model's pours."""
+        """Masks (d_c,) of the features that vary in the base model's pours, per condition."""
         found = []
         for block in self.pours["base"]:
             size = np.maximum(np.abs(block).max(axis=0), np.finfo(float).tiny)
@@ -85,7 +87,7 @@ class ReferencePours:
         return tuple(found)
 
     def only(self, keep: Sequence[npt.NDArray[np.bool_]]) -> ReferencePours:
-        """The same with the features that ``keep`` names in each condition."""
+        """The same pours with the features that the masks ``keep`` select in each condition."""
         pours = {
             name: tuple(block[:, kept] for block, kept in zip(blocks, keep, strict=True))
             for name, blocks in self.pours.items()
@@ -95,13 +97,13 @@ class ReferencePours:
 
 @dataclass(frozen=True)
 class Reference:
-    """Reference pours of a declared model, of so many rounds."""
+    """Reference pours of a declared model, after a number of rounds."""
 
     title: str
-    """Of the measurement that declares the model."""
+    """Title of the measurement that declares the model."""
     physics: int
     readings: int
-    """Versions of what was poured and of what was read off."""
+    """``physics`` and ``readings``: versions of what was poured and of what was read off."""
     features: tuple[tuple[str, ...], ...]
     """Names of the columns, per fitted condition."""
     levels: tuple[Level, ...]
@@ -110,7 +112,7 @@ class Reference:
 
 
 def reference_directions(effect: CandidateEffect) -> list[Direction]:
-    """Up and, where there is one, down; of two amplitudes along x and along y (the rest follows by symmetry)."""
+    """Up and, if the range goes below zero, down; with two amplitudes, x and y (the rest follows by symmetry)."""
     found = directions_of(effect)
     if effect.amplitudes == 1:
         return found
@@ -135,7 +137,7 @@ def reference_effect(declared: Declared, direction: Direction, share: float, num
 
 
 def reference_parameters(declared: Declared, number: int) -> list[list[Point]]:
-    """The first ``number`` pours with each parameter moved, below and above its mean in turn."""
+    """The first ``number`` pours with each parameter moved: one list below its mean, then one above it."""
     found = []
     for j, parameter in enumerate(declared.parameters):
         step = SIDE * (parameter.sd if parameter.sd is not None else (parameter.high - parameter.low) / 6.0)
@@ -148,7 +150,7 @@ def reference_parameters(declared: Declared, number: int) -> list[list[Point]]:
 
 
 def find_levels(declared: Declared, pours: ModelPours) -> list[Level]:
-    """The levels of every direction of every effect."""
+    """Reference amplitudes of every direction of every effect."""
     base = pours.run("reference: base model", reference_base(declared, FIRST_BASE))
     directions = [direction for effect in declared.effects for direction in reference_directions(effect)]
     searches = [
@@ -160,7 +162,7 @@ def find_levels(declared: Declared, pours: ModelPours) -> list[Level]:
 
 
 def extended(found: Reference, declared: Declared, pours: ModelPours) -> Reference:
-    """``found`` with one round more; pours that came to no valid end, or that cannot be read whole, are left out."""
+    """``found`` with one more round; pours that came to no valid end, or that cannot be read whole, are left out."""
     before = points_of(declared, found.levels, found.rounds) if found.rounds else {}
     kinds = points_of(declared, found.levels, found.rounds + 1)
     new = {kind: points[len(before.get(kind, ())) :] for kind, points in kinds.items()}
@@ -183,9 +185,9 @@ def extended(found: Reference, declared: Declared, pours: ModelPours) -> Referen
 
 
 def kept(path: Path, measurement: Measurement, physics: int) -> Reference:
-    """The reference of the fitted conditions of ``measurement`` in ``path``; without a pour where there is no file.
+    """The reference in ``path`` for the fitted conditions of ``measurement``; one without pours if there is no file.
 
-    Raises StatisticsError where it is of another model, physics, or readings.
+    Raises StatisticsError if the file is of another model, physics, or readings.
     """
     features = tuple(feature_set(condition).names for condition in measurement.fit)
     now = Reference(measurement.title, physics, READINGS, features, ())
@@ -202,7 +204,7 @@ def kept(path: Path, measurement: Measurement, physics: int) -> Reference:
 def extended_to(
     found: Reference, rounds: int, declared: Declared, pours: ModelPours, path: Path, say: Say
 ) -> Reference:
-    """``found`` with ``rounds`` rounds, written to ``path`` after each that was missing."""
+    """``found`` extended to ``rounds`` rounds, written to ``path`` after each new round."""
     if not found.levels and rounds:
         found = replace(found, levels=tuple(find_levels(declared, pours)))
     while found.rounds < rounds:
@@ -213,7 +215,7 @@ def extended_to(
 
 
 def save(found: Reference, path: Path) -> None:
-    """Write ``found`` as a compressed NumPy archive: a JSON head, and one array per kind and condition."""
+    """Write ``found`` to ``path`` as a compressed NumPy archive: a JSON head, and one array per kind and condition."""
     head = {
         **{name: getattr(found, name) for name in ("title", "physics", "readings", "features", "rounds")},
         "levels": plain(found.levels),
@@ -232,7 +234,7 @@ def save(found: Reference, path: Path) -> None:
 
 
 def load(path: Path) -> Reference:
-    """Read what :func:`save` wrote; raises StatisticsError for anything else, in one line."""
+    """Read a file that :func:`save` wrote; raises StatisticsError with a one-line message for any other."""
     try:
         file = npz_arrays(path)
         head = json.loads(bytes(file["head"]))

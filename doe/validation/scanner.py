@@ -1,9 +1,9 @@
-"""A made-up scanner: what it hands out of a pile, a grid of heights in a file, with everything that scanners get wrong.
+"""A made-up scanner, which turns a pile into a file with a grid of heights, with the errors that real scanners make.
 
-The highest point of the member spheres over every node of a grid, seen from above and from a camera aslant: what the
-pile hides from the camera is missing (shadow), and so are a few round patches (a reflecting grain). Heights have noise,
-and the axis that is told is off by a millimetre or two, the same for all scans of a set. No code is shared with what
-reads the file.
+A scan holds the highest point of the member spheres over every node of a grid, as seen from above and by an oblique
+camera: nodes that the pile hides from the camera are missing (shadow), and so are a few round patches (a reflecting
+grain). Heights have noise, and the stated axis is off by a millimetre or two, equally in all scans of a data set. This
+module shares no code with the reader of the file.
 """
 
 from __future__ import annotations
@@ -22,27 +22,27 @@ from solver import TABLE, Vector
 Array = npt.NDArray[np.float64]
 
 ELEVATION = (math.radians(50.0), math.radians(80.0))
-"""Of the camera above the plate."""
+"""Range of the camera's elevation above the plate [rad]."""
 PATCHES, PATCH_RADIUS = 6, 3.0e-3
-"""Missing patches of a scan at most, and their largest radius [m]."""
+"""Largest number of missing patches in a scan, and their largest radius [m]."""
 PLATE_MARGIN = 0.03
-"""Bare plate [m] that is scanned around the pile."""
+"""Width of bare plate [m] that is scanned around the pile."""
 FARTHEST = 0.15
-"""Bodies farther than this from the axis [m] are off the scanner's table."""
+"""Bodies farther than this from the axis [m] are outside the scanner's table."""
 
 
 @dataclass(frozen=True)
 class ScannerRanges:
-    """What scanners may be: ``[laboratory.scanner]``, lengths in metres or with a unit."""
+    """Ranges of a scanner's properties: ``[laboratory.scanner]``, lengths in metres or with a unit."""
 
     __pydantic_config__: ClassVar[ConfigDict] = TABLE
 
     grid: Annotated[tuple[float, ...], Vector(unit="m")] = (0.5e-3, 0.75e-3, 1.0e-3, 1.5e-3, 2.0e-3)
-    """Resolutions that one may buy."""
+    """Grid spacings that scanners may have."""
     noise: Annotated[tuple[float, float], Vector(2, "m")] = (0.05e-3, 0.3e-3)
     """Range of the standard deviation of a height."""
     axis_off: Annotated[tuple[float, float], Vector(2, "m")] = (1.0e-3, 2.0e-3)
-    """Range of what the axis is off, in any direction."""
+    """Range of the error of the stated axis, in any direction."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Scanner:
 
     @staticmethod
     def drawn(rng: np.random.Generator, ranges: ScannerRanges = ScannerRanges()) -> Scanner:
-        """A scanner that somebody may have."""
+        """A random scanner within ``ranges``."""
         off, towards = rng.uniform(*ranges.axis_off), rng.uniform(0.0, 2.0 * math.pi)
         return Scanner(
             grid=float(rng.choice(ranges.grid)),
@@ -70,11 +70,11 @@ class Scanner:
         )
 
     def scan(self, centre: Array, radius: Array, rng: np.random.Generator) -> dict[str, Array]:
-        """``height`` (n, n), ``x``, ``y`` (n,) [m] of spheres (m, 3), (m,); NaN where nothing was seen."""
+        """``height`` (n, n), ``x``, ``y`` (n,) [m] of spheres with centres (m, 3), radii (m,); NaN at unseen nodes."""
         near = np.hypot(centre[:, 0], centre[:, 1]) < FARTHEST
         centre, radius = centre[near], radius[near]
         reach = PLATE_MARGIN + (float(np.abs(centre[:, :2]).max()) if len(centre) else 0.0)
-        # Nodes do not lie on the axis but anywhere.
+        # The grid has a random offset from the axis.
         nodes = np.arange(-math.ceil(reach / self.grid), math.ceil(reach / self.grid) + 1) * self.grid
         x, y = (np.asarray(nodes + rng.uniform(0.0, self.grid), dtype=np.float64) for _ in range(2))
         height = tops(centre, radius, x, y)
@@ -89,7 +89,7 @@ class Scanner:
         return {"height": height, "x": believed[0], "y": believed[1]}
 
     def _shadow(self, height: Array) -> npt.NDArray[np.bool_]:
-        """Nodes from which the way to the camera is blocked by the pile."""
+        """Mask of the nodes whose line of sight to the camera is blocked by the pile."""
         away = np.array([math.cos(self.azimuth), math.sin(self.azimuth)])
         rise = math.tan(self.elevation) * self.grid
         blocked = np.zeros(height.shape, dtype=bool)
@@ -103,7 +103,7 @@ class Scanner:
         return blocked
 
     def table(self) -> dict[str, Any]:
-        """The ``[condition.scan]`` that the laboratory writes: its axis is the origin, which it takes for right."""
+        """The ``[condition.scan]`` that the laboratory writes: its axis is the origin, which it believes is right."""
         return {
             "axis": [0.0, 0.0],
             "plate": [0.0, 0.0, 0.0],
@@ -125,5 +125,5 @@ def tops(centre: Array, radius: Array, x: Array, y: Array) -> Array:
 
 
 def write_scan(path: Path, arrays: dict[str, Array]) -> None:
-    """Write one scan as ``.npz``."""
+    """Write one scan to an ``.npz`` file."""
     np.savez_compressed(path, allow_pickle=False, **{name: one.astype(np.float32) for name, one in arrays.items()})

@@ -1,15 +1,15 @@
-"""``sets.jsonl``, one line per data set and kind of data: what each answer is worth, and the rates of a campaign.
+"""``sets.jsonl``, one line per data set and kind of data: how each answer is scored, and the rates of a campaign.
 
-A line is appended as its set is judged. Its answer is one of
+A line is appended when its data set is judged. Its answer is one of
 
-right        the effect's name, or both of a pair
-undecided    ambiguous with the truth in it
-wrong        another name, or ambiguous without the truth; one of a pair alone
-unexplained  more than noise, and no name
+right        the effect's name, or both names of a pair
+undecided    ambiguous, with the truth among the names
+wrong        another name, ambiguous without the truth, or only one name of a pair
+unexplained  more than noise, but no name
 nothing      no missing effect
 
-Rows become rates with their denominators and Wilson intervals, and targets that are met or not. Wilson 1927, J. Am.
-Stat. Assoc. 22:209: (p + z²/2n ± z √(p (1 − p)/n + z²/4n²))/(1 + z²/n), z = 1.96.
+Rows are summarized as rates with denominators and Wilson intervals, and as targets that are met or not. Wilson 1927, J.
+Am. Stat. Assoc. 22:209: (p + z²/2n ± z √(p (1 − p)/n + z²/4n²))/(1 + z²/n), z = 1.96.
 """
 
 import json
@@ -33,20 +33,21 @@ from doe.record import Record
 Answer = Literal["right", "undecided", "wrong", "unexplained", "nothing", "out of reach"]
 
 OUT_OF_REACH = "out of reach: "
-"""Start of the verdict on a truth that cannot be, followed by the reason."""
+"""Start of the verdict on an impossible truth, followed by the reason."""
 NONE = "none"
-"""Label of a set in which nothing is missing."""
+"""Label of a data set in which nothing is missing."""
 LEVEL = 0.95
 HOLDOUT_GOOD = 1.25
-"""Holdout error ÷ noise floor that a set with a right name should not exceed."""
+"""Holdout error ÷ noise floor that a data set with a right name should not exceed."""
 RISKS = (0.0, 0.01, 0.025)
-"""Shares of sets with a library effect that get a wrong name at most, of the risk–coverage curve; 0.025 is 4 of 160."""
+"""Risks of the risk–coverage curve: largest shares of sets with a library effect that get a wrong name; 0.025 is 4 of
+160."""
 BINS = (0.0, 0.5, 0.7, 0.9, 0.99, 1.0)
-"""Ends of the probabilities of the reliability diagram."""
+"""Bin edges of the probabilities in the reliability diagram."""
 LEAST_P = 1e-6
-"""Of the truth, as the logarithmic loss counts it."""
+"""Smallest probability of the truth that the logarithmic loss uses."""
 TEMPERATURES = (0.4, 0.55, 0.7, 0.85, 1.0, 1.3)
-"""By which the evidence of kept rows is weighed again."""
+"""Factors by which the log evidence of kept rows is multiplied."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,41 +57,41 @@ class SetRow(Record):
     Attributes
     ----------
     laboratory
-        Title of its file.
+        Title of the laboratory's file.
     root, number
-        They give the truth and the pours.
+        Seeds of the truth and of the pours.
     kind, label
-        Of the truth; ``label``: library effect, "a+b", outside effect, or "none".
+        Kind and label of the truth; ``label``: library effect, "a+b", outside effect, or "none".
     strength
-        That was asked for [σ]; NaN where none was.
+        Strength that was asked for [σ]; NaN if none was.
     amplitude
-        Of the truth's library effects, natural units.
+        Amplitudes of the truth's library effects, natural units.
     offer
         "scalars" or "scan".
     verdict
-        The answer, after the follow-up where one was asked for.
+        The answer, after the follow-up if one was asked for.
     first, follow_up
-        The answer before, and the change of the set-up that was asked for; "" without one.
+        The answer before the follow-up, and the change of the set-up that was asked for; "" without one.
     asked, chance
-        Pours that were asked for there, 0 without one, and the chance of an answer that they were said to have.
+        Pours asked for in the follow-up, 0 without one, and the predicted chance that they give an answer.
     nothing, outside, best, best_p, truth_p
-        Probabilities; ``best``: the most probable effect, ``truth_p``: of the truth, NaN where it is no library effect.
+        Probabilities; ``best``: the most probable effect; ``truth_p``: of the truth, NaN if it is no library effect.
     evidence
-        Logarithms of the evidence of "base", "outside" and every effect, so that the rule can be tuned on what is kept.
+        Log evidence of "base", "outside" and every effect, so that the rule can be tuned on the kept rows.
     fits
-        Probability of data as far off, under the best fit of "base" and of ``best``.
+        Probability of data at least as far off, under the best fit of "base" and of ``best``.
     held_out_p
-        Of the final model on held-out data, NaN where it was not asked.
+        p value of the held-out data under the final model, NaN if it was not computed.
     before, after
-        Error ÷ noise floor on the held-out condition, of the calibrated base model and the named one; NaN unless the
-        name is right.
+        Error ÷ noise floor on the held-out condition, of the calibrated base model and of the model with the named
+        effect; NaN unless the name is right.
     bias_before, bias_after
         Root mean square of the parameters' errors, without and with the named effect [standard deviations of their
         measurements]; NaN unless the name is right.
     pours, seconds
-        Pours that were run for it, and wall time.
+        Number of pours that were run for the data set, and wall time [s].
     physics
-        Version of the solver's physics that poured; 0 in rows from before it was kept.
+        Version of the solver's physics in these pours; 0 in rows older than this column.
     """
 
     laboratory: str
@@ -124,17 +125,17 @@ class SetRow(Record):
 
     @property
     def answer(self) -> Answer:
-        """What the verdict is worth."""
+        """The score of the verdict."""
         return answer_to(self.verdict, self.label)
 
     @property
     def first_answer(self) -> Answer:
-        """What the answer before the follow-up was worth."""
+        """The score of the verdict before the follow-up."""
         return answer_to(self.first or self.verdict, self.label)
 
     @property
     def named(self) -> bool:
-        """Whether the verdict accuses an effect: names one, or leaves only effects."""
+        """Whether the verdict blames an effect: names one, or leaves only effects."""
         kind, _, rest = self.verdict.partition(":")
         if kind in ("effect", "effects"):
             return True
@@ -148,17 +149,17 @@ class SetRow(Record):
 
     @property
     def truth(self) -> frozenset[str]:
-        """Library effects that act."""
+        """The library effects that act."""
         return frozenset(self.label.split("+")) if self.kind in ("effect", "pair") else frozenset()
 
     @property
     def best_is_true(self) -> bool:
-        """Whether the most probable effect is the truth; the two of a pair in any order."""
+        """Whether the most probable effect is the truth; the two effects of a pair may be in any order."""
         return frozenset(self.best.split("+")) == self.truth
 
     @property
     def true_p(self) -> float:
-        """Probability that was given to what is true; 0 where it was not weighed."""
+        """Probability that the diagnosis gave to the truth; 0 if it did not consider it."""
         of_effect = self.best_p if self.best_is_true else self.truth_p
         p = {"null": self.nothing, "outside": self.outside}.get(self.kind, of_effect)
         return p if math.isfinite(p) else 0.0
@@ -166,14 +167,14 @@ class SetRow(Record):
 
 @dataclass(frozen=True)
 class Rate:
-    """``hits`` of ``sets``."""
+    """A proportion: ``hits`` out of ``sets``."""
 
     hits: int
     sets: int
 
     @property
     def share(self) -> float:
-        """NaN without sets."""
+        """``hits`` ÷ ``sets``; NaN without sets."""
         return self.hits / self.sets if self.sets else math.nan
 
     @property
@@ -190,7 +191,7 @@ class Rate:
 
 @dataclass(frozen=True)
 class CampaignTarget:
-    """What is aimed at, what came out, and whether that is met (None without a set to tell)."""
+    """A target, the result, and whether the target is met (None without data sets)."""
 
     name: str
     aim: str
@@ -200,7 +201,7 @@ class CampaignTarget:
 
 @dataclass(frozen=True)
 class Bin:
-    """Sets whose most probable answer has a probability in [low, high): mean of it, and how often it is the truth."""
+    """Sets whose most probable answer has a probability in [low, high): its mean, and how often the answer is true."""
 
     low: float
     high: float
@@ -210,20 +211,20 @@ class Bin:
 
 @dataclass(frozen=True)
 class Scores:
-    """How good the probabilities are, of sets judged by one kind of data.
+    """Scores of the probabilities, over data sets judged by one kind of data.
 
     Attributes
     ----------
     log_loss
-        Mean of −ln of the probability of what is true.
+        Mean of −ln of the probability of the truth.
     coverage
         Sets with library effects whose most probable effect is right and would be named, at each of ``RISKS``.
     reliability
         Sets by the probability of their most probable answer.
     f1
-        2 TP/(2 TP + FP + FN) of effects that are named and that act, over all sets.
+        2 TP/(2 TP + FP + FN) of effects named against effects that act, over all sets.
     bias_before, bias_after
-        Medians of the parameters' errors [standard deviations of their measurements] without and with the effect, of
+        Medians of the parameters' errors [standard deviations of their measurements], without and with the effect, over
         sets with a right name.
     """
 
@@ -237,10 +238,10 @@ class Scores:
 
 @dataclass(frozen=True)
 class Tempered:
-    """What another temperature would have made of the last evidence of sets with one effect at most.
+    """Results of the last evidence at another temperature, for sets with at most one effect.
 
-    ``log_loss``: as in ``Scores``. ``right``, ``wrong``: names of sets with an effect; ``false``: of sets without
-    one.
+    ``log_loss``: as in ``Scores``. ``right``, ``wrong``: names given to sets with an effect; ``false``: names given to
+    sets without one.
     """
 
     temperature: float
@@ -251,7 +252,7 @@ class Tempered:
 
 
 def answer_to(verdict: str, label: str) -> Answer:
-    """What ``verdict`` is worth where ``label`` is true, see above."""
+    """The score of ``verdict`` if ``label`` is true, as listed at the top of this module."""
     if verdict.startswith(OUT_OF_REACH):
         return "out of reach"
     kind, _, rest = verdict.partition(":")
@@ -268,10 +269,10 @@ def answer_to(verdict: str, label: str) -> Answer:
 
 
 def read_rows(path: Path) -> list[SetRow]:
-    """Rows in ``path``, in order of numbers and kinds of data; none where there is no such file.
+    """Rows in ``path``, in order of numbers and kinds of data; none if there is no such file.
 
-    A line that was cut off with the process that wrote it is passed over, and of a set that was judged twice the last
-    row counts. Raises StatisticsError for any other line that is no row.
+    A line that was cut off when its process ended is skipped, and the last row counts if a data set was judged twice.
+    Raises StatisticsError for any other line that is not a row.
     """
     if not path.is_file():
         return []
@@ -288,17 +289,17 @@ def read_rows(path: Path) -> list[SetRow]:
 
 
 def append_rows(path: Path, rows: Sequence[SetRow]) -> None:
-    """Add ``rows`` to the file, in one write, so that processes that share it do not mix lines."""
+    """Append ``rows`` to the file in one write, so that processes that share it do not mix lines."""
     text = "".join(json.dumps(_rounded(row.to_dict()), ensure_ascii=False) + "\n" for row in rows)
     last = path.read_bytes()[-1:] if path.is_file() else b""
-    if last not in (b"", b"\n"):  # behind a line that was cut off
+    if last not in (b"", b"\n"):  # after a line that was cut off
         text = "\n" + text
     with path.open("a", encoding="utf-8") as file:
         file.write(text)
 
 
 def scores(rows: Sequence[SetRow]) -> Scores:
-    """Scores of judged sets of one kind of data."""
+    """Scores of data sets judged by one kind of data."""
     library = [row for row in rows if row.kind in ("effect", "pair")]
     tops = [_top(row) for row in rows]
     bins = []
@@ -321,7 +322,7 @@ def scores(rows: Sequence[SetRow]) -> Scores:
 
 
 def by_temperature(rows: Sequence[SetRow]) -> tuple[Tempered, ...]:
-    """Judged sets of one kind of data at each of ``TEMPERATURES``, pairs of effects left out of truths and answers."""
+    """Results for judged sets of one kind of data at each of ``TEMPERATURES``, without pairs in truths and answers."""
     some = [row for row in rows if "outside" in row.evidence and row.kind != "pair"]
     found = []
     for temperature in TEMPERATURES:
@@ -347,7 +348,7 @@ def by_temperature(rows: Sequence[SetRow]) -> tuple[Tempered, ...]:
 
 
 def targets(rows: Sequence[SetRow], offer: str) -> list[CampaignTarget]:
-    """The targets for data of the kind ``offer``, from judged sets; shares are those of the counts asked of a test."""
+    """The targets for data of the kind ``offer``, from judged sets; shares correspond to the counts set for a test."""
     own = [row for row in rows if row.offer == offer]
     effects = [row for row in own if row.kind == "effect"]
     strong, middle = ([row for row in effects if row.strength == s] for s in (10.0, 6.0))
@@ -376,7 +377,7 @@ def targets(rows: Sequence[SetRow], offer: str) -> list[CampaignTarget]:
 
 
 def wilson(hits: int, sets: int, level: float = LEVEL) -> tuple[float, float]:
-    """Wilson's interval of a share; 0 … 1 without sets."""
+    """Wilson's confidence interval of the share ``hits`` ÷ ``sets``; 0 … 1 without sets."""
     if sets == 0:
         return 0.0, 1.0
     z = float(stats.norm.ppf(0.5 + level / 2.0))
@@ -394,14 +395,14 @@ def _rounded(value: Any) -> Any:
 
 def _row(cells: dict[str, Any]) -> SetRow:
     floats = {field.name for field in fields(SetRow) if field.type is float}
-    # A number that an older file does not have was not taken.
+    # A number missing from an older file was not recorded.
     values: dict[str, Any] = dict.fromkeys(floats, math.nan)
     values |= {key: math.nan if value is None and key in floats else value for key, value in cells.items()}
     return SetRow(**values)
 
 
 def _probabilities(row: SetRow, temperature: float) -> dict[str, float]:
-    """Of "base", "outside" and every single effect."""
+    """Posterior probabilities of "base", "outside" and every single effect."""
     singles = [name for name in row.evidence if name not in ("base", "outside") and "+" not in name]
     priors = priors_of(singles)
     logs = np.array([math.log(prior) + temperature * row.evidence[name] for name, prior in priors.items()])
@@ -420,7 +421,7 @@ def _top(row: SetRow) -> tuple[float, bool]:
 
 
 def _covered(rows: Sequence[SetRow], risk: float) -> int:
-    """Right names at the lowest threshold at which at most a share ``risk`` of ``rows`` get a wrong one."""
+    """Number of right names at the lowest threshold at which at most a share ``risk`` of ``rows`` get a wrong name."""
     most, right, wrong, covered = risk * len(rows), 0, 0, 0
     for row in sorted(rows, key=lambda row: -row.best_p):
         right, wrong = (right + 1, wrong) if row.best_is_true else (right, wrong + 1)

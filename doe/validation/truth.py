@@ -1,8 +1,8 @@
-"""What is true of a made-up laboratory: parameters within their measured uncertainty, and what the model lacks.
+"""The truth of a made-up laboratory: parameters within their measured uncertainty, and the effects the model lacks.
 
-A truth is drawn by the root and number of its data set. A campaign asks for rounds of the same cases, each shuffled. A
-truth's strength is that of the ruler (``limit.py``), measured once by many reference pours of the model at an amplitude
-and at half of it: between and beyond them s = s₁ (a/a₁)^p, with p from the two.
+A truth is drawn from random numbers seeded by the root and number of its data set. A campaign consists of rounds of the
+same cases, each round shuffled. Strengths are on the ruler (``limit.py``), measured once by many reference pours of the
+model at an amplitude a₁ and at half of it; between and beyond these two s = s₁ (a/a₁)^p, with p from both.
 """
 
 import math
@@ -18,30 +18,30 @@ from doe.validation.limit import Reached
 Kind = Literal["null", "effect", "pair", "outside"]
 
 STRENGTHS = (6.0, 10.0)
-"""[σ] of single effects."""
+"""Strengths of single effects [σ]."""
 WIDE_STRENGTHS = (4.0, 6.0, 8.0, 10.0, 15.0, 25.0, 40.0)
-"""[σ] of those of a development campaign, so that its rule has met whatever comes."""
+"""Strengths of single effects in a development campaign [σ], so that its rule meets every strength."""
 PAIR_STRENGTHS = (6.0, 10.0)
-"""Range [σ] of each of two."""
+"""Range of the strength of each effect of a pair [σ]."""
 ROUND = {"null": 15, "effect": 12, "pair": 4, "outside": 6}
-"""Sets of each kind in a round; ten rounds are a test: 150, 60 of each strength, 40 and 60."""
+"""Data sets of each kind in a round; a test has ten rounds: 150, 60 of each strength, 40 and 60."""
 REPLICATES = 6
 ROOT = 1
-"""Root of the seeds of the laboratories' pours; that of the diagnosis's pours is 0."""
+"""Root of the seeds of the laboratories' pours; the root of the diagnosis's pours is 0."""
 DISTINCT = 0.9
-"""Cosine of their signatures up to which two effects are made a pair: two that look alike are one to any data."""
+"""Largest cosine of the signatures of two effects that form a pair: no data distinguish two that look alike."""
 POWERS = (0.7, 2.0)
-"""Range of p: of two strengths with errors it may come out at anything."""
+"""Range to which p is clipped: computed from two strengths with errors it may take any value."""
 SEEN = 2.0
-"""Standard errors that a strength is above zero, or nobody knows its amplitude."""
+"""Standard errors by which a strength must exceed zero; otherwise the amplitude of a strength is unknown."""
 
 
 @dataclass(frozen=True)
 class Case:
     """Data set ``number`` of the campaign of ``root``.
 
-    ``label``: the outside effect, or "" for a library effect that is drawn with the truth. ``strength``: NaN where
-    there is none to ask for.
+    ``label``: the outside effect, or "" for a library effect that is drawn with the truth. ``strength``: [σ], NaN if
+    none is asked for.
     """
 
     root: int
@@ -52,15 +52,15 @@ class Case:
 
     @property
     def seed(self) -> tuple[int, int]:
-        """Of all its random numbers."""
+        """Seed of all its random numbers."""
         return self.root, self.number
 
 
 @dataclass(frozen=True)
 class Truth:
-    """``case``: what was asked for. ``theta`` and the amplitudes of ``effects`` in natural units.
+    """The truth of ``case``: ``theta`` and the amplitudes of ``effects`` in natural units.
 
-    ``missing``: why there is no such truth (``effects`` is empty then), else "".
+    ``missing``: why there is no such truth (``effects`` is then empty), else "".
     """
 
     case: Case
@@ -71,10 +71,10 @@ class Truth:
 
 @dataclass(frozen=True)
 class Strengths:
-    """Amplitudes of given strengths.
+    """Converts strengths to amplitudes.
 
-    ``reached``: by effect, the directions that were measured; ``declared``: the ranges; ``alike``: cosines of two
-    effects in the scalars, by their names.
+    ``reached``: the measured directions of each effect. ``declared``: the ranges of amplitudes. ``alike``: cosines of
+    the signatures of two effects in the scalars, by their names.
     """
 
     reached: Mapping[str, tuple[Reached, ...]]
@@ -82,7 +82,7 @@ class Strengths:
     alike: Mapping[frozenset[str], float]
 
     def amplitude(self, effect: str, strength: float, rng: np.random.Generator) -> tuple[float, ...] | None:
-        """The amplitude [natural units] of ``strength`` σ in a random direction; None beyond the literature."""
+        """Amplitude [natural units] of ``strength`` σ in a random direction; None beyond the literature's range."""
         ranges = next(one for one in self.declared.effects if one.name == effect)
         found = self.reached[effect]
         for k in rng.permutation(len(found)):
@@ -93,7 +93,7 @@ class Strengths:
             size = share * float(np.linalg.norm(one.amplitude))
             amplitude: tuple[float, ...]
             if len(one.amplitude) == 2:
-                # The effect of a direction is that of any other, by symmetry.
+                # By symmetry all directions are equally strong.
                 towards = rng.uniform(0.0, 2.0 * math.pi)
                 amplitude = (size * math.cos(towards), size * math.sin(towards))
                 limit = min(*ranges.high, *(-end for end in ranges.low))
@@ -112,13 +112,13 @@ class Strengths:
 
 
 def cases(root: int, number: int, outside: Sequence[str], wide: bool = False) -> Iterator[Case]:
-    """The first ``number`` cases of a campaign; ``wide``: of a development campaign."""
+    """The first ``number`` cases of a campaign, or, if ``wide``, of a development campaign."""
     drawn = 0
     strengths = WIDE_STRENGTHS if wide else STRENGTHS
     while drawn < number:
         rng = np.random.default_rng([root, drawn])
         one: list[tuple[Kind, str, float]] = [("null", "", float("nan"))] * ROUND["null"]
-        # As many of each strength as a round holds, in turn over the rounds.
+        # Strengths take turns, continuing over the rounds.
         first = drawn // sum(ROUND.values()) * ROUND["effect"]
         one += [("effect", "", strengths[(first + k) % len(strengths)]) for k in range(ROUND["effect"])]
         one += [("pair", "", float(rng.uniform(*PAIR_STRENGTHS))) for _ in range(ROUND["pair"])]
@@ -131,7 +131,7 @@ def cases(root: int, number: int, outside: Sequence[str], wide: bool = False) ->
 
 
 def truth_of(case: Case, strengths: Strengths) -> Truth:
-    """The truth of a case; with ``missing`` where no effect's range reaches its strength."""
+    """The truth of a case; with ``missing`` set if no effect's range reaches the strength."""
     rng = np.random.default_rng([ROOT, *case.seed])
     theta = drawn_theta(strengths.declared, rng)
     if case.kind in ("null", "outside"):
@@ -150,7 +150,7 @@ def truth_of(case: Case, strengths: Strengths) -> Truth:
 
 
 def drawn_theta(declared: Declared, rng: np.random.Generator) -> tuple[float, ...]:
-    """Parameters drawn from their independent measurement, or over their range, within what is believed."""
+    """Parameters drawn from their independent measurements or uniformly over their ranges, clipped to the ranges."""
     return tuple(
         rng.uniform(p.low, p.high) if p.mean is None or p.sd is None else p.within(float(rng.normal(p.mean, p.sd)))
         for p in declared.parameters
@@ -158,7 +158,7 @@ def drawn_theta(declared: Declared, rng: np.random.Generator) -> tuple[float, ..
 
 
 def strengths_of(reached: Sequence[Reached], declared: Declared, cosines: Mapping[frozenset[str], float]) -> Strengths:
-    """From what the reference pours reached."""
+    """The strengths measured by the reference pours, for the declared effects."""
     names = {effect.name for effect in declared.effects}
     by_effect: dict[str, tuple[Reached, ...]] = {}
     for one in reached:

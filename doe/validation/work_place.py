@@ -1,4 +1,4 @@
-"""Where the work is done: pours in a worker pool, pours with an outside effect and verdicts in processes beside it.
+"""Where pours are run: ordinary pours in a worker pool, pours with an outside effect in separate processes beside it.
 
 Every pour is kept in the store, by scene, seed, physics and outside effect, so that nothing is poured twice.
 """
@@ -23,12 +23,12 @@ from solver import Executor, Job, Outcome, Record, Scene, begin_worker, executor
 
 
 class OutOfTimeError(Exception):
-    """The time that was given is over; what has been poured is kept."""
+    """The time limit is over; what has been poured is kept."""
 
 
 @dataclass(frozen=True)
 class PourOrder:
-    """One pour that a laboratory asks for. ``outside``: name of an outside effect, or none."""
+    """One pour that a laboratory asks for. ``outside``: name of an outside effect, or ""."""
 
     scene: Scene
     seed: int
@@ -37,13 +37,13 @@ class PourOrder:
 
     @property
     def amount(self) -> float:
-        """By how much the outside effect acts."""
+        """Strength of the outside effect, with the sign that it has in the rig's frame."""
         effect = OUTSIDE_EFFECTS[self.outside]
         return -effect.amount if self.condition.turned and effect.has_direction else effect.amount
 
     @property
     def variant(self) -> str:
-        """What its pour has that its scene does not say."""
+        """Description of what the pour has beyond its scene; "" for an ordinary pour."""
         return f"{self.outside} {self.amount!r}, outside {OUTSIDE}" if self.outside else ""
 
     @property
@@ -52,37 +52,37 @@ class PourOrder:
         return pour_key(self.scene, self.seed, self.variant)
 
     def seen(self, record: Record) -> Record:
-        """The pour as the laboratory sees it."""
+        """The record of the pour as the laboratory sees it."""
         seen = OUTSIDE_EFFECTS[self.outside].seen if self.outside else None
         return record if seen is None else seen(record, self.amount)
 
     def drawn(self, height: float) -> float:
-        """By how much [weights] a single body is drawn to a plate, its centre at ``height`` [m]."""
+        """Force [weights] by which a single body with its centre at ``height`` [m] is drawn to a plate."""
         return OUTSIDE_EFFECTS[self.outside].drawn(height, self.amount) if self.outside else 0.0
 
     def reader(self, record: Record) -> dict[str, float]:
-        """What the laboratory reads off a pour that it sees."""
+        """Numbers that the laboratory reads off a pour as it sees it."""
         return {name: float(x) for name, x in readings_of_record(self.condition, record).items()}
 
 
 class CampaignListener(Protocol):
-    """Someone who is told how far a campaign is."""
+    """Receiver of reports on the progress of a campaign."""
 
     def pour(self, part: str, left: int, ended: Ended) -> None:
-        """A pour has ended, ``left`` more of this part are to come."""
+        """A pour has ended; ``left`` more are to come in this part."""
         ...
 
     def judged(self, done: int, planned: int, judged_now: int, line: str) -> None:
-        """``done`` of ``planned`` data sets are there, ``judged_now`` of them by this run; ``line``: last answer."""
+        """``done`` of ``planned`` data sets are judged, ``judged_now`` of them by this run; ``line``: last answer."""
         ...
 
     def watched(self, pours: Pours) -> Pours:
-        """What takes the place of ``pours``, and sees every record."""
+        """A replacement for ``pours`` that sees every record."""
         ...
 
 
 class WorkPlace:
-    """Workers and a deadline [s] on ``time.monotonic``; a context that ends the workers.
+    """Workers with a deadline [s] on ``time.monotonic``; a context manager that ends the workers.
 
     ``listener`` is told of every pour that ends.
     """
@@ -110,18 +110,18 @@ class WorkPlace:
 
     @property
     def pool(self) -> Executor:
-        """The pool, started when it is first needed."""
+        """The worker pool, started when it is first needed."""
         if self._pool is None:
             self._pool = self._stack.enter_context(executor(self.workers, self.scheduler))
         return self._pool
 
     def pours(self, queue: deque[Job], room: Sequence[Scene]) -> Iterable[tuple[Job, Record]]:
-        """Pours of the pool."""
+        """Run the jobs of ``queue`` in the pool, and yield each with its record."""
         pours = self.pool.run_queue
         return (pours if self._listener is None else self._listener.watched(pours))(queue, room)
 
     def ended(self, what: str, left: int, pour: Ended) -> None:
-        """Tell of a pour that has ended. Raises OutOfTimeError after the deadline."""
+        """Report a pour that has ended. Raises OutOfTimeError after the deadline."""
         if self._listener is not None:
             self._listener.pour(what, left, pour)
         self.look_at_the_clock()
@@ -132,7 +132,7 @@ class WorkPlace:
             raise OutOfTimeError
 
     def pour(self, orders: Sequence[PourOrder], room: Sequence[Scene]) -> list[LaboratoryPour | None]:
-        """The pours in order, None for one that broke off. ``room``: scenes that nearly all fit into."""
+        """The pours of ``orders``, in order, None for one that broke off. ``room``: scenes that nearly all fit into."""
         wanted = [order for order in {order.key: order for order in orders}.values() if not self._known(order)]
         plain = [order for order in wanted if not order.outside]
         queue = deque(Job(order.scene, order.seed, tag=k) for k, order in enumerate(plain))
@@ -150,7 +150,7 @@ class WorkPlace:
         return [self._sample(order) for order in orders]
 
     def map(self, function: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Any]:
-        """``function`` of every task, in order, in the processes beside the pool."""
+        """Results of ``function`` for all ``tasks``, in order, computed in the processes beside the pool."""
         if not tasks:
             return
         if self._beside is None:
@@ -167,7 +167,7 @@ class WorkPlace:
         assert stored is not None
         if not Outcome(stored.outcome).valid:
             return None
-        # Off the raw pour: what is kept may have been read by somebody whose scale is right.
+        # Read from the raw pour: the kept numbers may be those of a reader whose scale is right.
         record = order.seen(unpacked(stored.raw))
         spheres = record.pile.spheres
         return LaboratoryPour(order.reader(record), spheres.centre, spheres.radius)
@@ -195,5 +195,5 @@ def _outside(task: tuple[str, Scene, int, float]) -> Record:
 
 
 def complete(samples: Iterable[LaboratoryPour | None]) -> list[LaboratoryPour]:
-    """Pours that came to their end and of which everything could be read."""
+    """The pours that came to a valid end and of which every number could be read."""
     return [one for one in samples if one is not None and all(math.isfinite(x) for x in one.reading.values())]
