@@ -62,7 +62,7 @@ class Diagnosis:
     verdict: Verdict
     before: Confirmed
     after: Confirmed
-    """The same as ``before`` if no effect is named."""
+    """By ``verdict.final``: the same as ``before`` where that is the base model."""
     fit_error: tuple[HoldoutError, ...]
     holdout_error: tuple[HoldoutError, ...]
     held_out: HeldOut | None

@@ -99,7 +99,7 @@ class ParameterRow(Record):
 @dataclass(frozen=True)
 class Residual(Record):
     """One feature in natural units: measured mean, calibrated base model and final model. ``z_before``, ``z_after``:
-    residuals of both models over the standard deviation of noise, model and instrument, after recalibration.
+    residuals of both models, standardized: each over its standard deviation were the model right and so calibrated.
     """
 
     condition: str

@@ -266,7 +266,7 @@ def _residuals(compared: Compared, before: Fit, after: Fit) -> tuple[Residual, .
     measured = emulator.features(data.z)
     columns = []
     for fit in (before, after):
-        # What the parameters follow is not left: with θ ~ N(0, I), z − ẑ = (I − J C Jᵀ N⁻¹)(z − m) for N = diag(variance).
+        # The fit follows part of the noise: with θ ~ N(0, I) and N = diag(variance), z − ẑ = (I − J C Jᵀ N⁻¹)(z − m).
         left = np.eye(len(data.z)) - fit.slopes @ fit.theta_covariance @ (fit.slopes / fit.variance[:, None]).T
         whole = np.diag(fit.variance) + fit.slopes @ fit.slopes.T + data.instrument @ data.instrument.T
         spread = left @ whole @ left.T

@@ -13,7 +13,7 @@ import numpy as np
 
 from solver import Batch, Members, Pour, Record, Scene, capacity_for, parameters, poured_mass, value, with_values
 
-OUTSIDE = 1
+OUTSIDE = 2
 """Version of this file: increase it with every change to what any of its pours does."""
 PLATE = 0
 """Index of the plate among the funnel rig's surfaces."""
@@ -78,45 +78,52 @@ def outside_pour(name: str, scene: Scene, seed: int, amount: float) -> Record:
     return OUTSIDE_EFFECTS[name].pour(scene, seed, amount)
 
 
-def driven(scene: Scene, seed: int, act: Callable[[Batch, Pour], None] | None = None, every: float = np.inf) -> Record:
-    """The record of one pour, with ``act`` called at least every ``every`` seconds."""
+Act = Callable[[Batch, Pour, float], None]
+"""What is done to a pour, given the time [s] since it was last done."""
+
+
+def driven(scene: Scene, seed: int, act: Act | None = None, every: float = np.inf) -> Record:
+    """The record of one pour, with ``act`` called at least every ``every`` seconds.
+
+    More often, too: a launch also ends where the pour has a sample to take or a body to drop.
+    """
     batch = Batch(capacity_for([scene], 1))
     pour = Pour(batch, 0, scene, seed)
     at_most = None if act is None else max(1, round(every / pour.dt))
     while due := pour.steps_due(at_most):
         pour.after(due, batch.advance(np.array([due], dtype=np.int32))[0])
         if act is not None:
-            act(batch, pour)
+            act(batch, pour, due * pour.dt)
     return pour.record()
 
 
-def vibrate(batch: Batch, pour: Pour, speed: float) -> None:
+def vibrate(batch: Batch, pour: Pour, passed: float, speed: float) -> None:
     """Move the plate up and down at ``speed`` [m/s], in the opposite direction after every ``HALF_PERIOD``."""
     sign = 1.0 if round(pour.time / HALF_PERIOD) % 2 == 0 else -1.0
     batch.set_motion(0, PLATE, (0.0, 0.0, sign * speed), (0.0, 0.0, 0.0))
 
 
-def attract(batch: Batch, pour: Pour, strength: float) -> None:
-    """Apply the attraction's impulse over ``KICK`` to every body near the plate."""
+def attract(batch: Batch, pour: Pour, passed: float, strength: float) -> None:
+    """Apply the attraction's impulse over ``passed`` seconds to every body near the plate."""
     state = batch.bodies(0, pour.entered)
     for b in np.flatnonzero((state[:, 2] < 3.0 * REACH) & (state[:, 13] > 0.5)):
         velocity = state[b, 7:10].copy()
-        velocity[2] -= strength * 9.81 * np.exp(-state[b, 2] / REACH) * KICK
+        velocity[2] -= strength * 9.81 * np.exp(-state[b, 2] / REACH) * passed
         batch.enter(0, int(b), state[b, 0:3], state[b, 3:7], velocity, state[b, 10:13])
 
 
-def turn(batch: Batch, pour: Pour, rate: float) -> None:
+def turn(batch: Batch, pour: Pour, passed: float, rate: float) -> None:
     """Turn the plate about the vertical at ``rate`` [rad/s]."""
     batch.set_motion(0, PLATE, (0.0, 0.0, 0.0), (0.0, 0.0, rate))
 
 
-def blow(batch: Batch, pour: Pour, acceleration: float) -> None:
-    """Apply the draught's impulse over ``KICK`` to every falling body, above the pile and below the outlet."""
+def blow(batch: Batch, pour: Pour, passed: float, acceleration: float) -> None:
+    """Apply the draught's impulse over ``passed`` seconds to every falling body between pile and outlet."""
     state = batch.bodies(0, pour.entered)
     outlet = float(value(pour.scene, "rig.outlet_height"))
     for b in np.flatnonzero((state[:, 2] > REACH) & (state[:, 2] < outlet) & (state[:, 13] > 0.5)):
         velocity = state[b, 7:10].copy()
-        velocity[0] += acceleration * KICK
+        velocity[0] += acceleration * passed
         batch.enter(0, int(b), state[b, 0:3], state[b, 3:7], velocity, state[b, 10:13])
 
 
@@ -163,9 +170,11 @@ def with_stuck(record: Record, stuck: float) -> Record:
     return dataclasses.replace(record, trace=trace, poured_mass=record.poured_mass + stuck)
 
 
-def _acted_on(act: Callable[[Batch, Pour, float], None], every: float) -> Callable[[Scene, int, float], Record]:
+def _acted_on(act: Callable[[Batch, Pour, float, float], None], every: float) -> Callable[[Scene, int, float], Record]:
     """A function that runs pours on which ``act`` acts every ``every`` seconds."""
-    return lambda scene, seed, amount: driven(scene, seed, lambda batch, pour: act(batch, pour, amount), every)
+    return lambda scene, seed, amount: driven(
+        scene, seed, lambda batch, pour, passed: act(batch, pour, passed, amount), every
+    )
 
 
 def _without(scene: Scene, seed: int, share: float) -> Record:

@@ -47,8 +47,7 @@ ROOT = 2
 """Root of the seeds, different from those of a diagnosis (0) and of the made-up laboratories (1)."""
 TRIALS = Trials(pours=6, most=5, enough=10.0, too_much=15.0)
 SIDE = 1.5
-"""Standard deviations by which a parameter is moved; a parameter without one is moved by this many sixths of its
-range."""
+"""Standard deviations (``CalibratedParameter.deviation``) by which a parameter is moved."""
 
 FIRST_BASE = 48
 """Pours of the base model from which the pilot estimates the covariance."""
@@ -140,7 +139,7 @@ def reference_parameters(declared: Declared, number: int) -> list[list[Point]]:
     """The first ``number`` pours with each parameter moved: one list below its mean, then one above it."""
     found = []
     for j, parameter in enumerate(declared.parameters):
-        step = SIDE * (parameter.sd if parameter.sd is not None else (parameter.high - parameter.low) / 6.0)
+        step = SIDE * parameter.deviation
         for sign in (-1.0, 1.0):
             theta = list(middle(declared.parameters))
             theta[j] += sign * step

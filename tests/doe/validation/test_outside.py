@@ -33,7 +33,7 @@ def test_a_pour_that_nothing_acts_on_is_any_pour(record, scene):
 
 
 def test_cut_into_short_launches_it_is_the_same_pour(record, scene):
-    again = outside.driven(scene, SEED, lambda batch, pour: None, outside.KICK)
+    again = outside.driven(scene, SEED, lambda batch, pour, passed: None, outside.KICK)
     assert np.array_equal(again.bodies.position, record.bodies.position)
 
 
@@ -65,8 +65,8 @@ def test_broken_bodies_weigh_what_they_weighed(scene):
 def test_the_plate_swings_about_a_fixed_height(taichi, scene):
     heights = []
 
-    def act(batch, pour):
-        outside.vibrate(batch, pour, 0.02)
+    def act(batch, pour, passed):
+        outside.vibrate(batch, pour, passed, 0.02)
         heights.append(batch.surface_state(0)[outside.PLATE, 2])
 
     outside.driven(scene, SEED, act, outside.HALF_PERIOD)
@@ -77,17 +77,22 @@ def test_the_plate_swings_about_a_fixed_height(taichi, scene):
 
 
 def test_the_attraction_gives_its_impulse_to_bodies_near_the_plate(taichi, scene):
-    seen = []
+    seen, total = [], []
 
-    def act(batch, pour):
+    def act(batch, pour, passed):
         before = batch.bodies(0, pour.entered)
-        outside.attract(batch, pour, 0.5)
+        outside.attract(batch, pour, passed, 0.5)
+        assert passed <= 0.02 * (1.0 + 1e-9)
+        total.append(passed)
         seen.append((before, batch.bodies(0, pour.entered)))
 
-    outside.driven(scene, SEED, act, 0.02)
+    last = outside.driven(scene, SEED, act, 0.02)
+    # Launches are also cut at samples: impulses over the time that passed add up to those over the whole pour.
+    assert sum(total) == pytest.approx(last.trace.time[-1], rel=1e-6)
     before, after = (np.concatenate(part) for part in zip(*seen, strict=True))
     near = before[:, 2] < 3 * outside.REACH
-    given = -0.5 * 9.81 * np.exp(-before[near, 2] / outside.REACH) * outside.KICK
+    given = -0.5 * 9.81 * np.exp(-before[near, 2] / outside.REACH)
+    given *= np.concatenate([np.full(len(one), step) for (one, _), step in zip(seen, total, strict=True)])[near]
     assert near.any()
     assert not near.all()
     assert after[near, 9] - before[near, 9] == pytest.approx(given, rel=1e-6)
