@@ -2,9 +2,7 @@
 
 
 class StatisticsError(ValueError):
-    """Input that no statistic can be computed from; the message names the argument, its value and what is
-    allowed.
-    """
+    """Input from which no statistic can be computed; the message names the argument, its value and what is allowed."""
 
 
 class StudyFileError(ValueError):
@@ -20,9 +18,9 @@ class AuditError(ValueError):
 
 
 class StudyStopped(RuntimeError):
-    """A study that ended before its last stage, because what the runs gave cannot be analysed.
+    """A study that ended before its last stage because the results of its runs cannot be analysed.
 
-    Not a ValueError: the input was right, the outcome is what it is.
+    Not a ValueError: the input was valid.
     """
 
     def __init__(self, stage: str, reason: str, runs: int) -> None:

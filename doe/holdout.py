@@ -1,32 +1,32 @@
-"""Held-out conditions: the error before and after beside the noise floor, and whether they contradict an answer.
+"""Held-out conditions: prediction errors before and after, the noise floor, and whether the data contradict an answer.
 
-Per observable over its holdout conditions: RMSE = root mean square of (mean simulated - mean measured);
-noise floor = root mean square of sqrt(s_meas^2/n_meas + s_sim^2/n_sim), what a perfect model would show;
-skill = 1 - (after^2 - noise^2)/(before^2 - noise^2). Overall, every observable is divided by the standard deviation of
-a pour first,
+Per observable, over its held-out conditions: RMSE = root mean square of (mean simulated - mean measured);
+noise floor = root mean square of sqrt(s_meas^2/n_meas + s_sim^2/n_sim), the error of a perfect model;
+skill = 1 - (after^2 - noise^2)/(before^2 - noise^2). For the overall errors, each observable is first divided by the
+standard deviation of a pour,
 
     s^2 = ((n - 1) s_meas^2 + (m - 1) s_after^2)/(n + m - 2)
 
-pooled over the n measured pours and the m simulated ones of the final model: s_meas of a few pours is small by chance
-somewhere, and that observable would then make most of the sum. With n = 3, m = 8 and eleven normal observables a
-perfect model shows 1.5 times the floor (root mean square) by s_meas, 1.15 times by s. Predictions are fresh
-simulations, never the emulator.
+pooled over the n measured pours and the m simulated pours of the final model. The s_meas of a few pours alone will not
+do: for some observable it is small by chance, and that observable would then dominate the sum. With n = 3, m = 8 and
+eleven normal observables, a perfect model shows 1.5 times the floor (root mean square) if scaled by s_meas, 1.15 times
+if scaled by s. Predictions are fresh simulations, never the emulator.
 
-Of replicates that are means of k pours each, the variance is s^2/k, and k s_meas^2 goes into s. A single measured
-replicate does not tell its scatter. Its variance is that of the simulated pours of the final model and of its
-instrument, s_after^2/k + u^2 with the stated u.
+If each replicate is the mean of k pours, its variance is s^2/k, and k s_meas^2 enters s. A single measured replicate
+gives no estimate of its scatter; its variance is then that of the simulated pours of the final model plus that of the
+instrument, s_after^2/k + u^2 with the stated uncertainty u.
 
-An answer is held against the farthest summary of the final model over all held-out conditions,
+An answer is tested on the summary that deviates most from the final model, over all held-out conditions,
 
     |t| = max |measured − poured| / (s √(1/(k r) + 1/m))
 
 with r measured replicates, each the mean of k pours, and m fresh pours, s pooled over both and f = r + m − 2 degrees of
-freedom. For a single one s is that of the fresh pours alone, and below the bar stands √(s² (1/k + 1/m) + u²), with
-f (1 + u²/(s² (1/k + 1/m)))² of freedom (Welch and Satterthwaite, doi 10.2307/3002019). Bonferroni's
-p = (number of summaries) P(|t_f| ≥ |t|) is summary by summary because what is missing shows in what it acts on, not
-evenly over all. With the probability p₀ of fitted data as far off the same model it contradicts the answer where
-Fisher's P = q (1 − ln q), q = p p₀, is below ``CONTRADICTED`` (Statistical Methods for Research Workers, 1932, 21.1): a
-wrong model is often somewhat off in both.
+freedom. For a single replicate s is that of the fresh pours alone, the denominator is √(s² (1/k + 1/m) + u²), and the
+degrees of freedom are f (1 + u²/(s² (1/k + 1/m)))² (Welch and Satterthwaite, doi 10.2307/3002019). Bonferroni's
+p = (number of summaries) P(|t_f| ≥ |t|) tests each summary by itself, because a missing effect shows in the summaries
+on which it acts, not evenly in all. It is combined with p₀, the probability that fitted data lie as far from the same
+model: the held-out data contradict the answer if Fisher's P = q (1 − ln q), q = p p₀, is below ``CONTRADICTED``
+(Statistical Methods for Research Workers, 1932, 21.1). A wrong model is often somewhat off in both.
 """
 
 from __future__ import annotations
@@ -47,7 +47,8 @@ FloatArray = npt.NDArray[np.float64]
 
 OVERALL = "overall"
 CONTRADICTED = 0.01
-"""Of 255 right names and "nothing missing" (roots 1 to 3) none is below, six of 16 names for what is outside are."""
+"""Of 255 right answers, names and "nothing missing" (roots 1 to 3), none is below; of 16 names given to effects from
+outside the library, six are."""
 CONSTANT_FLOOR = 1e-3
 """Least standard deviation of a summary, as a share of its size."""
 
@@ -63,9 +64,9 @@ class MeasuredReplicates:
     values
         Replicates (r, d).
     stated
-        Standard uncertainty of a replicate (d,), 0 where none is stated; used for a single one.
+        Standard uncertainty of a replicate (d,), 0 where none is stated; used if there is only one replicate.
     mean_of
-        Pours whose mean a replicate is.
+        Number of pours of which each replicate is the mean.
     """
 
     condition: str
@@ -76,22 +77,22 @@ class MeasuredReplicates:
 
     @property
     def alone(self) -> bool:
-        """Whether there is one replicate, which does not tell its scatter."""
+        """Whether there is only one replicate, so that its scatter is unknown."""
         return len(self.values) == 1
 
     @property
     def instrument(self) -> FloatArray:
-        """The uncertainty that is not in the scatter of the replicates (d,): what is stated, of a single one."""
+        """Uncertainty that the scatter of the replicates does not contain (d,): what is stated for a single one."""
         return self.stated if self.alone else np.zeros_like(self.stated)
 
     @property
     def deviation(self) -> FloatArray:
-        """Standard deviation of the replicates (d,), or what is stated of a single one."""
+        """Standard deviation of the replicates (d,), or the stated uncertainty of a single replicate."""
         return self.stated if self.alone else np.asarray(self.values.std(axis=0, ddof=1), dtype=np.float64)
 
     @property
     def share(self) -> float:
-        """Variance of a replicate, without that, as a share of a pour's."""
+        """Variance of a replicate, without that of the instrument, as a share of the variance of a pour."""
         return 1.0 / self.mean_of
 
     def deviation_of_a_pour(self, poured: FloatArray) -> FloatArray:
@@ -101,7 +102,7 @@ class MeasuredReplicates:
 
 @dataclass(frozen=True)
 class HoldoutCondition:
-    """What was measured in one condition beside pours of the base model (m, d) and of the final one (m', d)."""
+    """Measurements in one condition, with pours of the base model (m, d) and of the final model (m', d)."""
 
     measured: MeasuredReplicates
     before: FloatArray
@@ -110,10 +111,10 @@ class HoldoutCondition:
 
 @dataclass(frozen=True)
 class HoldoutError(Record):
-    """Errors of one observable (its own unit) or overall (standard deviations of a replicate).
+    """Errors of one observable (in its own unit) or overall (in standard deviations of a replicate).
 
-    skill with its 95 % bootstrap interval is NaN where the base model is within the noise already. ratio = after/noise.
-    coverage_before, coverage_after: share of measured pours inside the models' 90 % predictive intervals.
+    skill and its 95 % bootstrap interval are NaN if the base model is already within the noise. ratio = after/noise.
+    coverage_before, coverage_after: share of measured replicates inside the models' 90 % predictive intervals.
     """
 
     observable: str
@@ -226,9 +227,9 @@ def _error(observable: str, entries: Sequence[_Entry], unit: FloatArray) -> Hold
 
 @dataclass(frozen=True)
 class HeldOut(Record):
-    """What fresh pours of a model say of held-out data: |t| of the farthest summary, which it is, Bonferroni's p.
+    """Held-out data compared with fresh pours of a model: the summary that deviates most, its |t|, and Bonferroni's p.
 
-    ``fit``: p of the fitted data under that model; 1 where the answer leaves several.
+    ``fit``: p of the fitted data under that model; 1 where the answer leaves several models.
     """
 
     label: str
@@ -240,7 +241,7 @@ class HeldOut(Record):
 
     @property
     def together(self) -> float:
-        """Fisher's probability of both, P(U₁ U₂ ≤ q) = q (1 − ln q) with q their product."""
+        """Fisher's combined probability, P(U₁ U₂ ≤ q) = q (1 − ln q), with q the product of ``p`` and ``fit``."""
         q = self.p * self.fit
         return q * (1.0 - math.log(q)) if q > 0.0 else 0.0
 
@@ -272,7 +273,7 @@ def held_out(
 
 
 def _skill(before: float, after: float) -> float:
-    """Return 1 - after/before of squared errors freed from noise; NaN where nothing is left before."""
+    """Return 1 - after/before of squared errors less their noise; NaN where nothing but noise is left in `before`."""
     return 1 - after / before if before > 0 else math.nan
 
 
@@ -286,7 +287,7 @@ def _inside(
 ) -> FloatArray:
     """Return 1 where a measured replicate lies within mean ± t sqrt(s^2 (share + 1/m) + u^2) of m simulated pours.
 
-    The degrees of freedom of t are those of s, also beside u.
+    The degrees of freedom of t are those of s, even where u is added.
     """
     m = len(predicted)
     variance = float(predicted.var(ddof=1)) * (share + 1 / m) + instrument**2

@@ -1,6 +1,6 @@
-"""What other seeds give: an observable over all stored pours of one scene, and what a change of it could show.
+"""The distribution of an observable over seeds: all stored pours of one scene, and how a changed setting differs.
 
-One pour is one draw. Notation: y = a single pour, m, s, n = mean, standard deviation and size of a population,
+One pour is one draw. Notation: y = a single pour; m, s, n = mean, standard deviation and size of a population;
 t(q, ν) = quantile of Student's t.
 """
 
@@ -18,7 +18,7 @@ from doe.record import Record
 from doe.store import StoredRun
 
 PLANNED = 12
-"""Pours of each of two settings for which the difference is told that they would show."""
+"""Number of pours of each of two settings for which the detectable difference is stated."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Population(Record):
 
     @property
     def sample(self) -> Sample:
-        """Return mean, standard deviation and n; NaN where there are too few values for them."""
+        """Return mean, standard deviation and n; NaN where there are too few values."""
         return Sample.of(self.values) if self.values else Sample(math.nan, math.nan, 0)
 
     @property
@@ -57,7 +57,7 @@ class Population(Record):
 
 @dataclass(frozen=True)
 class Comparison(Record):
-    """A difference from a population with its 95 % interval, ``pours`` of the new setting against ``former`` ones."""
+    """Difference of ``pours`` of a new setting from ``former`` pours, with the half width of its 95 % interval."""
 
     difference: float
     half_width: float
@@ -65,22 +65,23 @@ class Comparison(Record):
     former: int
     planned: int
     resolved: float
-    """Difference that ``planned`` pours of each setting would show with 80 % power at p < 0.05."""
+    """Difference that ``planned`` pours of each setting would detect with 80 % power at p < 0.05."""
 
     @property
     def distinguishable(self) -> bool:
-        """Whether the interval leaves zero out."""
+        """Whether the interval excludes zero."""
         return abs(self.difference) > self.half_width
 
 
 def compared(new: Population, single: float, former: Population, planned: int = PLANNED) -> Comparison | None:
-    """Return how a changed setting differs from the ``former`` one; None where nothing says how far seeds scatter.
+    """Return how a changed setting differs from the ``former`` one; None where the scatter between seeds is unknown.
 
-    With two or more pours of the ``new`` setting it is Welch's test of both means. Otherwise the ``single`` pour stands
-    against the interval in which one more pour of the former setting falls with 95 %,
+    With two or more pours of the ``new`` setting, the two means are compared by Welch's test. Otherwise the ``single``
+    pour is compared with the 95 % prediction interval of one more pour of the former setting,
     m ± t(0.975, n − 1) s √(1 + 1/n) (Hahn & Meeker 1991, Statistical Intervals, section 4.7).
 
-    ``planned`` pours of each resolve `doe.analysis.power.smallest_difference`: (shift of the noncentral t) s √(2/n).
+    ``planned`` pours of each setting resolve `doe.analysis.power.smallest_difference`:
+    (shift of the noncentral t) s √(2/n).
     """
     before, after = former.sample, new.sample
     if before.n < 2 or not before.sd > 0:
@@ -88,7 +89,7 @@ def compared(new: Population, single: float, former: Population, planned: int = 
     if after.n >= 2:
         test = welch_test(after, before)
         difference, half = test.difference, (test.high - test.low) / 2
-        # Pooled: both say how far seeds scatter.
+        # Pooled: both samples estimate the scatter between seeds.
         freedom = before.n + after.n - 2
         sd = math.sqrt(((before.n - 1) * before.sd**2 + (after.n - 1) * after.sd**2) / freedom)
     elif math.isfinite(single):

@@ -1,4 +1,4 @@
-"""From settings of parameters to finished runs: seeds, replicates, replacement of failed runs, resume by the store."""
+"""From parameter settings to finished runs: seeds, replicates, replacement of failed runs, resuming from the store."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from solver import Record as PourRecord
 
 
 class PourObserver(Protocol):
-    """Someone who watches pours that are really run (not those found in the store), to record them."""
+    """An observer that records pours as they are run (not those found in the store)."""
 
     def sample(self, stage: str, seed: int, pour: Any) -> None:
-        """Called at every moment of decision of a running pour."""
+        """Called whenever a running pour is sampled."""
         ...
 
     def finish(self, stage: str, seed: int, record: PourRecord) -> None:
@@ -28,26 +28,26 @@ class PourObserver(Protocol):
 
 
 OnRun = Callable[[str, Run, int], None]
-"""Called with (stage, run, replicates of this stage that are still to come)."""
+"""Called with (stage, run, number of replicates of this stage still outstanding)."""
 
 
 def seed_of(study_seed: int, stage: str, row: int, replicate: int, attempt: int, experiment: str = "") -> int:
-    """A seed of its own for every run: independent streams from one root (NumPy's SeedSequence)."""
+    """Return a distinct seed for every run: independent streams from one root (NumPy's SeedSequence)."""
     entropy = [study_seed, *stage.encode(), row, replicate, attempt, *experiment.encode()]
     return int(np.random.SeedSequence(entropy).generate_state(1)[0])
 
 
 Pours = Callable[[deque[Job], Sequence[Scene]], Iterable[tuple[Job, PourRecord]]]
-"""Runs the jobs of a queue, to which more may be added meanwhile, with room for the scenes named."""
+"""Runs the jobs of a queue, which may grow meanwhile, with room for the scenes given."""
 
 
 def stored_run(
     job: Job, record: PourRecord, study: str, stage: str, label: str, reader: Reader, key: str, variant: str = ""
 ) -> StoredRun:
-    """A finished job as the store keeps it, with what ``reader`` reads off it.
+    """Return a finished job as the store keeps it, with the readings of ``reader``.
 
-    ``key`` is that of the pour when it was asked for, ``variant`` what it was made with (`pour_key`). Raises StoreError
-    where the key is another one by now: a mesh file was changed meanwhile.
+    ``key`` is the key of the pour at the time of the request, ``variant`` the variant it was made with (`pour_key`).
+    Raises StoreError if the key has changed since, because a mesh file was changed meanwhile.
     """
     if pour_key(job.scene, job.seed, variant) != key:
         raise StoreError(f"{stage}, {label}: a mesh file changed during the pour; start again")
@@ -74,10 +74,10 @@ def stored_run(
 class PourRunner:
     """Runs settings as pours and keeps every run in the store.
 
-    ``tries`` seeds are tried for one replicate. ``seeds`` are those of the replicates, of which then none is replaced;
-    None: a stream of its own for every run (:func:`seed_of`). ``experiments``: the scenes of the study's further
-    experiments by name. Pours run in this process, where ``observer`` can watch
-    them, or as ``pours`` says (``solver.Executor.run_queue``); ``watched`` looks on at how either ends.
+    ``tries``: number of seeds tried for one replicate. ``seeds``: one seed per replicate, with no replacement of failed
+    runs; if None, every run has its own seed (:func:`seed_of`). ``experiments``: the scenes of the study's further
+    experiments by name. Pours run in this process, where ``observer`` can watch them, or by ``pours``
+    (``solver.Executor.run_queue``); ``watched`` wraps either of them to follow how pours end.
     """
 
     def __init__(
@@ -109,7 +109,7 @@ class PourRunner:
         return [sorted(runs, key=self._order) for runs in found]
 
     def each(self, stage: str, settings: Sequence[Setting]) -> Iterator[tuple[int, Run]]:
-        """Yield (number of the setting, run) as each ends, so that nobody has to keep them all."""
+        """Yield (index of the setting, run) as each run ends, so that the caller need not keep them all."""
         scenes = {
             (row, name): with_values(self._scenes[name], setting.values)
             for row, setting in enumerate(settings)
@@ -145,7 +145,7 @@ class PourRunner:
                 places.append((row, experiment, replicate, attempt, key))
                 queue.append(Job(scene, seed, tag=len(places) - 1))
 
-        # The whole design once, then again: what is there so far can be analysed long before the last run.
+        # The whole design once, then again, so that a partial analysis is possible long before the last run.
         for replicate in range(max((setting.replicates for setting in settings), default=0)):
             for row, setting in enumerate(settings):
                 if replicate < setting.replicates:

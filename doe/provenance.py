@@ -1,4 +1,4 @@
-"""What a result carries for its report beside the numbers: who made it and when, and of what it was made."""
+"""Information for the report that a result carries beside its numbers: its author and date, and its set-up."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from doe.record import Record
 
 @dataclass(frozen=True)
 class About(Record):
-    """Who made a result and when ("2026-11-26"), and what they noted; empty where nobody said."""
+    """Author of a result, its date ("2026-11-26") and the author's notes; empty where not given."""
 
     author: str = ""
     date: str = ""
@@ -18,7 +18,7 @@ class About(Record):
 
 @dataclass(frozen=True)
 class PouredPile(Record):
-    """Mean silhouette of the piles of one setting, and ``sd`` between pours, over ``u`` from their middle [m]."""
+    """Mean silhouette of the piles of one setting and its ``sd`` between pours, over ``u`` from the middle [m]."""
 
     name: str
     pours: int
@@ -31,7 +31,7 @@ class PouredPile(Record):
 class SetUp(Record):
     """The scene at its reference values: ``rig``, the material of its ``wall``, and ``dt``, the time step [s].
 
-    ``values``: path → value of every parameter (SI, or the name of a choice); ``materials``: body → its material.
+    ``values``: path → value of every parameter (SI, or the name of a choice); ``materials``: body → material.
     """
 
     rig: str

@@ -1,8 +1,8 @@
-"""Results as plain data and back: every result of `doe` is a frozen dataclass that JSON types can hold.
+"""Conversion of results to plain data and back: every result of `doe` is a frozen dataclass that JSON types can hold.
 
-``to_dict`` needs nothing but the fields. ``from_dict`` reads their annotations: nested dataclasses, tuples, lists,
-mappings, arrays, literals, unions. NaN and infinities become None, because JSON has no name for them, and None is NaN
-again where the annotation is a float.
+``to_dict`` needs only the fields. ``from_dict`` follows their annotations: nested dataclasses, tuples, lists, mappings,
+arrays, literals, unions. NaN and infinities become None, because JSON cannot express them; None is read as NaN where
+the annotation is a float.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 
 
 class RecordError(ValueError):
-    """Plain data that are not those of the record; the message names the place and what was expected there."""
+    """Plain data that do not fit the record; the message names the place and what was expected there."""
 
 
 class VersionError(RecordError):
@@ -30,7 +30,8 @@ class VersionError(RecordError):
 def plain(value: Any) -> Any:
     """Return `value` as JSON types: dict, list, str, bool, int, float or None.
 
-    Dataclasses become dictionaries, arrays and tuples lists, paths their text. NaN and infinities become None.
+    Dataclasses become dictionaries, arrays and tuples become lists, paths and enums text. NaN and infinities become
+    None.
 
     Raises TypeError for a type that has no plain form.
     """
@@ -57,14 +58,14 @@ class Record:
     """Base of the result dataclasses."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return every field by its name as JSON types (see `plain`)."""
+        """Return all fields by name as JSON types (see `plain`)."""
         return _fields(self)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
-        """Return the record that ``to_dict`` made ``data`` of, fields without a value at their defaults.
+        """Return the record from which ``to_dict`` made ``data``; fields without a value take their defaults.
 
-        Keys that are no field are passed over.
+        Unknown keys are ignored.
 
         Raises RecordError for a field that is missing or of another type.
         """
@@ -72,7 +73,7 @@ class Record:
 
 
 class Document(Record):
-    """A record that is a file: its dictionary begins with the number of its ``SCHEMA``, called ``NAME`` in messages."""
+    """A record that is a file: its dictionary begins with the number ``SCHEMA``; messages call it ``NAME``."""
 
     SCHEMA: ClassVar[int]
     NAME: ClassVar[str]
@@ -83,7 +84,7 @@ class Document(Record):
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
-        """Return the document; raises VersionError for another schema, RecordError for what is no such document."""
+        """Return the document; raises VersionError for another schema, RecordError for data that do not fit it."""
         schema = data.get("schema") if isinstance(data, Mapping) else None
         if schema != cls.SCHEMA:
             older = isinstance(schema, int) and schema < cls.SCHEMA
@@ -120,7 +121,7 @@ def _record(kind: Any, value: Any, where: str) -> Any:
 
 
 def _value(kind: Any, value: Any, where: str) -> Any:
-    """``value`` as the annotation ``kind`` wants it."""
+    """``value`` converted to the type that the annotation ``kind`` states."""
     origin, arguments = get_origin(kind), get_args(kind)
     if kind is Any:
         return value

@@ -1,10 +1,10 @@
-"""The store: every pour that finished, kept raw in one SQLite file and found again by what was poured.
+"""The store: every finished pour, kept raw in one SQLite file and found again by what was poured.
 
-A pour is kept once and for all under the key of what decides its bits (`solver.pours.pour_key`). What is read off it,
-its outcome, its observables and the summaries of a diagnosis, is kept beside it with the version of the readings, and
-read anew from the raw pour where that version has changed or a name is missing: a new observable costs no pour.
+A pour is kept permanently under the key of everything that determines its bits (`solver.pours.pour_key`). Its readings
+(outcome, observables and the summaries of a diagnosis) are kept beside it with their version, and are read again from
+the raw pour if that version has changed or a name is missing: a new observable costs no pour.
 
-A file belongs to one version of the physics. One of an older version stays readable; nothing is poured into it.
+A file belongs to one version of the physics. A file of an older version stays readable, but no pours are added to it.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ import platformdirs
 from solver import PHYSICS, RIGS, Outcome, RawPourError, Record, Scene, observables_in, observe, pour_keys, unpacked
 
 READINGS = 2
-"""Version of what is read off a raw pour. Raise it when an outcome, an observable, a summary or a profile comes to be
-another for the same pour; a new name needs no new version. `tests/doe/golden_readings.json` holds it to that.
+"""Version of the readings of a raw pour. Raise it when an outcome, an observable, a summary or a profile changes for
+the same pour; a new name needs no new version. `tests/doe/golden_readings.json` enforces this.
 
-2: a flat layer is `no_heap` where a heap's angle of repose is asked for.
+2: a flat layer is `no_heap` where the angle of repose of a heap is asked for.
 """
 
 SCHEMA_VERSION = 1
@@ -43,21 +43,21 @@ CREATE TABLE IF NOT EXISTS pours (
 )
 """
 KEPT_AS = {"parameters": dict, "observables": dict, "raw": bytes}
-"""What columns hold once they are read; SQLite itself takes anything in any column."""
+"""Types of columns once they are read; SQLite itself accepts any value in any column."""
 DAMAGE = (sqlite3.Error, OSError, UnicodeDecodeError)
-"""What SQLite and the file system raise for a file that is damaged or out of reach; the last where the text of a
-complaint is damaged itself."""
+"""Exceptions of SQLite and the file system for a damaged or unreachable file; the last occurs if the text of the error
+message is itself damaged."""
 OWN = {"store", "pours"}
-"""Names of its tables."""
+"""Names of the tables of a store."""
 BEFORE_RAW_POURS = "runs"
 """The table of a store made before raw pours were kept: readings only, physics 0."""
 
 Reader = Callable[[Record], Mapping[str, float]]
-"""Reads named numbers off a record; NaN where there is nothing to read."""
+"""Reads named numbers from a record; NaN where there is nothing to read."""
 Readings = dict[str, float | None]
 """Numbers by name; None where nothing could be read."""
 RIG = "rig.name"
-"""Beside the parameters of a stored run: which rig it was poured in."""
+"""Key, among the parameters of a stored run, of the rig in which it was poured."""
 
 
 class StoreError(ValueError):
@@ -75,11 +75,11 @@ class StoredRun:
     seed: int
     physics: int
     outcome: str
-    """Read off the raw pour, as ``message`` is: what the pour ended as, and whether it left a heap."""
+    """Read from the raw pour, like ``message``: how the pour ended, and whether it left a heap."""
     message: str
     parameters: dict[str, Any]
     readings: int
-    """Version of the readings that the outcome and ``observables`` are of."""
+    """Version of the readings to which the outcome and ``observables`` belong."""
     observables: Readings
     dt: float
     steps: int
@@ -90,42 +90,42 @@ class StoredRun:
 
     @property
     def valid(self) -> bool:
-        """True if what was read off the run counts, as of `doe.run_records.Run`."""
+        """True if the readings of the run count, as in `doe.run_records.Run`."""
         return Outcome(self.outcome).valid
 
 
 def one_line(error: Exception) -> str:
-    """What ``error`` says, of which a damaged file may be a part, in one line that is not too long to read."""
+    """Return the message of ``error``, which may quote a damaged file, as one line of readable length."""
     return " ".join(str(error).split())[:200]
 
 
 def default_store() -> Path:
-    """``$REPOSE_STORE``, or the file of the present physics in the user's data directory."""
+    """Return ``$REPOSE_STORE``, or the file of the current physics in the user's data directory."""
     named = os.environ.get("REPOSE_STORE")
     return Path(named) if named else Path(platformdirs.user_data_dir("repose-explorer")) / f"pours_{PHYSICS}.sqlite"
 
 
 def observables_in_rig(run: StoredRun) -> tuple[str, ...]:
-    """Names of the observables of the rig of ``run``; none for a rig that is not known."""
+    """Return the names of the observables of the rig of ``run``; none for an unknown rig."""
     rig = RIGS.get(str(run.parameters.get(RIG)))
     return observables_in(rig()) if rig is not None else ()
 
 
 def address(path: Path, reading: bool) -> str:
-    """The store file ``path`` as the URI that SQLite opens.
+    """Return the URI by which SQLite opens the store file ``path``.
 
-    A file in a folder where nothing can be made is opened ``reading`` as one that nobody changes: SQLite has no place
-    there for what processes share.
+    When ``reading`` in a folder that is not writable, the file is opened as immutable, because SQLite cannot create the
+    files there that processes share.
     """
     unchanging = reading and not os.access(path.parent, os.W_OK) and not Path(f"{path}-wal").exists()
     return path.absolute().as_uri() + ("?immutable=1" if unchanging else "")
 
 
 def read_off(raw: bytes, reader: Reader) -> Readings:
-    """Return what ``reader`` reads off a raw pour.
+    """Return the readings of a raw pour by ``reader``.
 
-    Always off the raw pour, never off the record that it was packed from: a reading is the same number whether it is
-    taken when the pour ends or years later.
+    They are always taken from the raw pour, never from the record that was packed into it, so that a reading is the
+    same number whether it is taken when the pour ends or years later.
     """
     return _numbers(reader(unpacked(raw)))
 
@@ -135,15 +135,15 @@ def _numbers(seen: Mapping[str, float]) -> Readings:
 
 
 def observables_of(record: Record) -> dict[str, float]:
-    """The observables of the record's rig: the reader of a study."""
+    """Return the observables of the record's rig; the reader of a study."""
     return {name: found.value for name, found in observe(record).items()}
 
 
 class Store:
     """Pours in a SQLite file; several processes may read and write at once.
 
-    ``pouring`` says whether pours will be added. Raises StoreError for a file that is no store, and, if pours will be
-    added, for one that cannot be written and for one of another version of the physics.
+    ``pouring``: whether pours will be added. Raises StoreError for a file that is not a store and, if pours will be
+    added, for one that cannot be written or belongs to another version of the physics.
     """
 
     def __init__(self, path: Path, pouring: bool = True) -> None:
@@ -167,7 +167,7 @@ class Store:
 
     @contextlib.contextmanager
     def _told(self) -> Iterator[None]:
-        """Turn what SQLite and the file system complain of into one line."""
+        """Turn errors of SQLite and the file system into a StoreError of one line."""
         try:
             yield
         except DAMAGE as error:
@@ -176,7 +176,7 @@ class Store:
             ) from None
 
     def _opened(self) -> str:
-        """Name of the table that holds the runs; made where there is none."""
+        """Name of the table that holds the runs; created if there is none."""
         version = self._db.execute("PRAGMA user_version").fetchone()[0]
         if version > SCHEMA_VERSION:
             raise StoreError(
@@ -190,7 +190,7 @@ class Store:
         if tables - OWN:
             raise StoreError(f"{self.path}: a database of another program (it has a table {min(tables - OWN)!r})")
         if version == 0:
-            # Two processes may make it at once: one switches the journal, the other finds the file locked meanwhile.
+            # If two processes create it at once, one switches the journal mode while the other finds the file locked.
             with contextlib.suppress(sqlite3.OperationalError):
                 self._db.execute("PRAGMA journal_mode=WAL")
             with self._db:
@@ -206,7 +206,7 @@ class Store:
 
     @property
     def version(self) -> str:
-        """Of which physics it is, and whether that is an old one, in words."""
+        """The version of the physics of the store, and whether it is an old one, in words."""
         if self.physics == PHYSICS:
             return f"physics {PHYSICS}"
         made = f"physics {self.physics}" if self.physics else "a program that kept no raw pours"
@@ -214,7 +214,7 @@ class Store:
         return f"{age}, of {made}; this program pours by physics {PHYSICS} and adds nothing to it"
 
     def find(self, key: str) -> StoredRun | None:
-        """The run with that key, or None; its outcome is of the present version of the readings.
+        """Return the run with that key, or None; its outcome is that of the current version of the readings.
 
         Raises StoreError for a raw pour that cannot be read.
         """
@@ -227,9 +227,9 @@ class Store:
         return dataclasses.replace(run, outcome=str(record.outcome), message=record.message)
 
     def pours_of(self, scene: Scene) -> Iterator[StoredRun]:
-        """Yield the runs of exactly ``scene``, by seed: for every seed that any run has, what :meth:`find` finds.
+        """Yield the runs of exactly ``scene`` by seed: every seed in the store is looked up with :meth:`find`.
 
-        None in a store of another physics, whose keys are others. Raises StoreError as :meth:`find`.
+        Yields nothing for a store of another physics, whose keys are different. Raises StoreError like :meth:`find`.
         """
         if self.physics != PHYSICS:
             return
@@ -240,7 +240,10 @@ class Store:
                 yield run
 
     def wall_times(self, study: str, parameters: Mapping[str, float | str]) -> list[float]:
-        """Wall times [s] of the pours of ``study`` that have these ``parameters``, or lack them."""
+        """Return the wall times [s] of those pours of ``study`` whose parameters match ``parameters``.
+
+        A parameter that a pour lacks counts as matching.
+        """
         kept = " AND ".join("ifnull(json_extract(parameters, ?), ?) = ?" for _ in parameters)
         values = [entry for path, value in parameters.items() for entry in (f'$."{path}"', value, value)]
         with self._told():
@@ -248,7 +251,7 @@ class Store:
             return [float(wall_s) for (wall_s,) in found]
 
     def add(self, run: StoredRun) -> None:
-        """Keep a run; on disk when this returns."""
+        """Store a run; it is on disk when this returns."""
         values = dataclasses.asdict(run)
         values["parameters"] = json.dumps(run.parameters, sort_keys=True)
         values["observables"] = json.dumps(run.observables, sort_keys=True)
@@ -258,17 +261,17 @@ class Store:
             self._db.execute(f"INSERT OR REPLACE INTO pours ({_COLUMNS}) VALUES ({marks})", [values[n] for n in _NAMES])
 
     def read(self, run: StoredRun, names: Iterable[str], reader: Reader) -> StoredRun:
-        """Return ``run`` with its outcome and the readings ``names`` of the present version.
+        """Return ``run`` with its outcome and the readings ``names`` in the current version.
 
-        Those that are kept, if they are of that version and all of ``names`` are there. Otherwise ``reader`` reads the
-        raw pour again, and what it finds is kept, but for a store of an older physics and one that takes nothing. A run
-        without a raw pour is returned as it is. Raises StoreError for a raw pour that cannot be read.
+        The stored readings are returned if they are of that version and include all ``names``. Otherwise ``reader``
+        reads the raw pour again, and the new readings are stored, unless the store is of another physics or not
+        writable. A run without a raw pour is returned unchanged. Raises StoreError for a raw pour that cannot be read.
         """
         present = run.readings == READINGS
         if not run.raw or (present and run.observables.keys() >= set(names)):
             return run
         record = self._record(run)
-        # What is kept was read by whoever knew the pour best.
+        # Stored readings take precedence: they were made by the reader that knew the pour best.
         kept = run.observables if present else {}
         run = dataclasses.replace(
             run,
@@ -278,7 +281,7 @@ class Store:
             observables=_numbers(reader(record)) | kept,
         )
         if self.physics == PHYSICS:
-            # On a full disk, or where nothing may be written, it is read again the next time.
+            # If it cannot be stored (full disk, read-only file), it is read again next time.
             with contextlib.suppress(StoreError):
                 self.add(run)
         return run
@@ -305,7 +308,7 @@ class Store:
         return StoredRun(**values)
 
     def runs(self, study: str | None = None) -> Iterator[StoredRun]:
-        """All runs, oldest first; of one study if named. Read with the version that they were read with."""
+        """Yield all runs, or those of one study, oldest first; their readings are as stored, of whichever version."""
         where, arguments = ("WHERE study = ?", (study,)) if study else ("", ())
         columns = _COLUMNS if self._table == "pours" else _COLUMNS_BEFORE_RAW_POURS
         with self._told():
@@ -325,7 +328,7 @@ _COLUMNS_BEFORE_RAW_POURS = ", ".join(_ABSENT.get(name, name) for name in _NAMES
 
 def write_csv(runs: Iterable[StoredRun], file: IO[str]) -> int:
     """Write runs as CSV, one column per parameter and observable that occurs; returns the number of rows."""
-    # Raw pours take a hundred times the room of what is written.
+    # Raw pours take a hundred times as much memory as the data written.
     rows = [dataclasses.replace(run, raw=b"") for run in runs]
     parameters = sorted({name for run in rows for name in run.parameters})
     observables = sorted({name for run in rows for name in run.observables})

@@ -1,6 +1,6 @@
-"""Looking after store files: is one whole, hand part of it on, bring two together, drop what is no longer wanted.
+"""Maintenance of store files: check one, export part of it, merge two, prune runs that are no longer wanted.
 
-All of it works on the raw pours; readings go with them. A file is changed in one transaction or not at all.
+All operations work on raw pours; their readings go with them. A file is changed in one transaction or not at all.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ class Checked:
     runs: dict[str, int]
     """Study → runs."""
     size: int
-    """[bytes], with the log beside it."""
+    """Size [bytes], including the log beside the file."""
     damaged: tuple[str, ...]
-    """One line for each run whose raw pour cannot be read, and for what SQLite complains of; none in a whole store."""
+    """One line for each run whose raw pour cannot be read and for each problem that SQLite reports; empty if intact."""
 
 
 @dataclass(frozen=True)
 class Merged:
-    """How many runs of another store were added, and how many were there already."""
+    """Number of runs that were added from another store, and of runs that were already there."""
 
     added: int
     known: int
 
 
 def check(path: Path) -> Checked:
-    """Read every page of the file and every raw pour in it. Raises StoreError for a file that is no store."""
+    """Read every page of the file and every raw pour in it. Raises StoreError for a file that is not a store."""
     with _opened(path, readings_do=True) as (store, db):
         complaints = [line for (line,) in db.execute("PRAGMA integrity_check") if line != "ok"]
         runs: Counter[str] = Counter()
@@ -51,15 +51,15 @@ def check(path: Path) -> Checked:
 
 
 def size(path: Path) -> int:
-    """What a store takes on the disk [bytes], with the log beside it, which holds what was written last."""
+    """Return the size of a store on disk [bytes], including the log beside it, which holds the latest writes."""
     log = Path(f"{path}-wal")
     return path.stat().st_size + (log.stat().st_size if log.is_file() else 0)
 
 
 def export(path: Path, to: Path, study: str) -> int:
-    """Copy the runs of ``study`` into the new store file ``to``; returns how many.
+    """Copy the runs of ``study`` into the new store file ``to``; returns their number.
 
-    Raises StoreError where there are none, or the new file exists.
+    Raises StoreError if there are none, or if the new file exists.
     """
     if to.exists():
         raise StoreError(f"{to}: exists already; choose another name, or merge into it")
@@ -69,19 +69,19 @@ def export(path: Path, to: Path, study: str) -> int:
         with contextlib.closing(Store(to, pouring=False)):
             pass
         with _opened(to) as (_, db), _attached(db, path), db:
-            # Of the physics that it was poured by, whatever that of this program is.
+            # The physics that made the pours, which need not be that of this program.
             db.execute("UPDATE store SET physics = (SELECT physics FROM other.store)")
             return db.execute("INSERT INTO pours SELECT * FROM other.pours WHERE study = ?", (study,)).rowcount
-    except BaseException:  # by Ctrl-C as well
+    except BaseException:  # including Ctrl-C
         to.unlink(missing_ok=True)
         raise
 
 
 def merge(path: Path, other: Path) -> Merged:
-    """Add the runs of ``other`` to the store ``path``; a pour that both have stays as it is.
+    """Add the runs of ``other`` to the store ``path``; pours that both contain stay unchanged.
 
-    Raises StoreError, and adds nothing, for a store of another physics, and where both hold the same pour with
-    different bits: one of them was not poured by this solver, or is damaged.
+    Raises StoreError, and adds nothing, for a store of another physics, and if both contain the same pour with
+    different bits: one of the two was not poured by this solver, or is damaged.
     """
     if path.resolve() == other.resolve():
         raise StoreError(f"{other}: is the store to merge into; name another one")
@@ -107,31 +107,31 @@ def merge(path: Path, other: Path) -> Merged:
 
 
 def count(path: Path, study: str) -> int:
-    """The number of runs of ``study``."""
+    """Return the number of runs of ``study``."""
     with _opened(path) as (_, db):
         return int(db.execute("SELECT count(*) FROM pours WHERE study = ?", (study,)).fetchone()[0])
 
 
 def prune(path: Path, study: str) -> int:
-    """Remove the runs of ``study`` and give their room back; returns how many. Raises StoreError where there are none.
+    """Remove the runs of ``study`` and free their space; returns their number. Raises StoreError if there are none.
 
-    A pour that another study found in the store is kept under the study that poured it first: that one has to pour it
-    again.
+    A pour is kept under the study that poured it first. Another study that reused it has to pour it again after that
+    study is removed.
     """
     with _opened(path) as (_, db):
         _has(db, path, study)
         with db:
             removed = db.execute("DELETE FROM pours WHERE study = ?", (study,)).rowcount
         db.execute("VACUUM")
-        # While others have the store open, the file gets shorter only by this.
+        # While other processes have the store open, only this shortens the file.
         db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         return removed
 
 
 def bits(raw: bytes) -> bytes:
-    """A raw pour without the time that it took, which alone differs when it is poured again.
+    """Return a raw pour without its wall time, the only part that differs when it is poured again.
 
-    Raises RawPourError for one that cannot be read.
+    Raises RawPourError for a raw pour that cannot be read.
     """
     return packed(dataclasses.replace(unpacked(raw), wall_s=0.0))
 
@@ -153,9 +153,9 @@ def _unreadable(run: StoredRun) -> str | None:
 
 @contextlib.contextmanager
 def _opened(path: Path, readings_do: bool = False) -> Iterator[tuple[Store, sqlite3.Connection]]:
-    """The store and a connection of its own; what SQLite complains of meanwhile is a StoreError.
+    """The store and a separate connection to it; errors of SQLite in the meantime become a StoreError.
 
-    ``readings_do``: also a store from before raw pours were kept.
+    ``readings_do``: also accept a store made before raw pours were kept.
     """
     if not path.is_file():
         raise StoreError(f"{path}: no such store")

@@ -1,11 +1,11 @@
-"""Tables that people bring: CSV as any spreadsheet saves it, or a workbook (.xlsx), of which the first sheet is read.
+"""Tables provided by users: CSV as any spreadsheet saves it, or a workbook (.xlsx), of which the first sheet is read.
 
-CSV has its cells between commas, semicolons or tabs, and its numbers with a decimal point or comma. Programs set to
-German, French and many other languages write ``;`` between cells and a comma in numbers. The header decides: what
-stands in it most often is the delimiter, and only beside a comma as the delimiter a comma is no decimal sign; a header
-of one name has no delimiter. The characters are UTF-8 with or without a mark, UTF-16 with one, or else Windows's
-(cp1252). Lines that begin with # are comments, also where a spreadsheet has quoted them or filled them up with
-delimiters.
+CSV cells are separated by commas, semicolons or tabs, and numbers have a decimal point or comma: programs set to
+German, French and many other languages write ``;`` between cells and a comma in numbers. The header decides: the
+delimiter is whichever of the three occurs in it most often, and unless that is the comma, a comma in a cell is a
+decimal sign. A header of one name has no delimiter. The encoding is UTF-8 with or without a byte order mark, UTF-16
+with one, or else that of Windows (cp1252). Lines that begin with # are comments, even if a spreadsheet has quoted them
+or padded them with delimiters.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from pathlib import Path
 DELIMITERS = (",", ";", "\t")
 WORKBOOK = ".xlsx"
 SUFFIXES = (".csv", WORKBOOK)
-"""Of files with a table."""
+"""File name suffixes of tables."""
 UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
 @dataclass(frozen=True)
 class CellTable:
-    """Rows and comments by the number of the line in which they begin, from 1 on.
+    """Rows and comments with the number, from 1, of the line in which each begins.
 
-    rows: the header first; cells without spaces around them. Rows without any content are left out, and so are empty
-    cells behind the last name of the header.
+    rows: the header first; cells are stripped of surrounding spaces. Empty rows are left out, and so are empty cells
+    beyond the last name of the header.
     """
 
     rows: tuple[tuple[int, list[str]], ...]
@@ -38,31 +38,31 @@ class CellTable:
     decimal_comma: bool
 
     def plain(self, text: str) -> str:
-        """The text of a number with a decimal point."""
+        """Return the text of a number with a decimal point."""
         return text.replace(",", ".") if self.decimal_comma else text
 
     def number(self, text: str) -> float:
-        """A cell as a number; NaN where it is not a finite one."""
+        """Return a cell as a number; NaN if it is not a finite number."""
         plain = self.plain(text).replace("−", "-")
         try:
             value = float(plain)
         except ValueError:
             return math.nan
-        # Python reads 1_000 as a thousand; no spreadsheet means that.
+        # Python reads 1_000 as a thousand; no spreadsheet does.
         return value if math.isfinite(value) and "_" not in plain else math.nan
 
 
 def read_table(
     path: Path, most_bytes: int, wrong: Callable[[str], Exception], place: str = ", line {}", comments: bool = False
 ) -> CellTable:
-    """The table in the file ``path``.
+    """Read the table in the file ``path``.
 
     Args:
-        path: CSV, or a workbook where it ends in .xlsx.
+        path: CSV, or a workbook if its name ends in .xlsx.
         most_bytes: a larger file is refused.
-        wrong: makes the error about a file or a line of it; its message begins with ``path``.
-        place: how a line is named behind ``path``.
-        comments: whether # also begins a comment behind the cells of a row.
+        wrong: makes the exception about a file or one of its lines from a message that begins with ``path``.
+        place: how a line is named after ``path``.
+        comments: whether # also begins a comment after the cells of a row.
     """
     content = _content(path, most_bytes, wrong)
     if path.suffix.lower() == WORKBOOK:
@@ -74,9 +74,9 @@ def read_table(
 
 
 def check_cells(table: CellTable, wrong: Callable[[int, str], Exception], short: bool = False) -> None:
-    """Raise ``wrong(line, what)`` for the first row that has another number of cells than the header.
+    """Raise ``wrong(line, what)`` for the first row whose number of cells differs from that of the header.
 
-    ``short``: whether a row may have fewer.
+    ``short``: whether a row may have fewer cells.
     """
     columns = len(table.rows[0][1]) if table.rows else 0
     for line, cells in table.rows:
@@ -89,7 +89,7 @@ def check_cells(table: CellTable, wrong: Callable[[int, str], Exception], short:
 
 
 def read_text(path: Path, most_bytes: int, wrong: Callable[[str], Exception]) -> str:
-    """The text in ``path``, lines ending in ``\\n``; raises ``wrong(line)``, the line naming the file, otherwise."""
+    """Return the text in ``path``, lines ending in ``\\n``; on failure raise ``wrong(message)``, naming the file."""
     text = decoded(_content(path, most_bytes, wrong))
     if text is None:
         raise wrong(f"{path}: not a text file")
@@ -97,7 +97,7 @@ def read_text(path: Path, most_bytes: int, wrong: Callable[[str], Exception]) ->
 
 
 def decoded(content: bytes) -> str | None:
-    """``content`` as text, lines ending in ``\\n``; None where it is none."""
+    """Return ``content`` as text, lines ending in ``\\n``; None if it is not text."""
     encodings = ("utf-16",) if content.startswith(UTF_16) else ("utf-8-sig", "cp1252")
     for encoding in encodings:
         try:
@@ -121,13 +121,13 @@ def _content(path: Path, most_bytes: int, wrong: Callable[[str], Exception]) -> 
 
 
 def _of_workbook(content: bytes, wrong: Callable[[str], Exception]) -> CellTable:
-    """The first sheet; numbers have a decimal point there, whatever is shown on a screen."""
-    # Imported where it is used: it takes a second, and hardly anybody brings a workbook.
+    """The first sheet; its numbers have a decimal point, whatever the spreadsheet displays."""
+    # Imported here because it takes a second and few users bring a workbook.
     import pandas
 
     try:
         frame = pandas.read_excel(io.BytesIO(content), header=None, dtype=str, keep_default_na=False, engine="openpyxl")
-    except Exception as error:  # whatever a ZIP reader and an XML parser raise for what is no workbook
+    except Exception as error:  # a ZIP reader and an XML parser may raise anything for a file that is not a workbook
         raise wrong(f"cannot be read as a workbook: {error}") from None
     comments: list[tuple[int, str]] = []
     rows: list[tuple[int, list[str]]] = []
@@ -141,12 +141,12 @@ def _of_workbook(content: bytes, wrong: Callable[[str], Exception]) -> CellTable
 
 
 def csv_table(text: str, wrong: Callable[[int, str], Exception], trailing_comments: bool = False) -> CellTable:
-    """The table in ``text``.
+    """Return the table in ``text``.
 
     Args:
         text: content of the file (:func:`decoded`).
-        wrong: makes the error about a line that cannot be split into cells, from its number and what is wrong.
-        trailing_comments: whether # also begins a comment behind the cells of a row.
+        wrong: makes the exception for a line that cannot be split into cells, from its number and the problem.
+        trailing_comments: whether # also begins a comment after the cells of a row.
     """
     lines: list[tuple[int, str]] = []
     comments: list[tuple[int, str]] = []
@@ -159,13 +159,13 @@ def csv_table(text: str, wrong: Callable[[int, str], Exception], trailing_commen
         if content.strip(" ,;\t"):
             lines.append((number, content))
     header = lines[0][1] if lines else ","
-    # Below a header of one name a comma can only be decimal.
+    # With a header of one name, a comma can only be a decimal sign.
     delimiter = max(DELIMITERS, key=header.count) if any(map(header.count, DELIMITERS)) else ";"
     return CellTable(tuple(_rows(lines, delimiter, wrong)), tuple(comments), delimiter != ",")
 
 
 def _without_comment(line: str) -> str:
-    """``line`` up to the first # that stands outside quotes."""
+    """``line`` up to the first # outside quotes."""
     end = next((k for k, sign in enumerate(line) if sign == "#" and line.count('"', 0, k) % 2 == 0), len(line))
     return line[:end]
 
@@ -176,7 +176,7 @@ def _rows(
     reader = csv.reader((f"{line}\n" for _, line in lines), delimiter=delimiter, strict=True)
     rows: list[tuple[int, list[str]]] = []
     while reader.line_num < len(lines):
-        # A cell in quotes may hold line breaks: the row is named by its first line.
+        # A quoted cell may contain line breaks: the row is named by its first line.
         number = lines[reader.line_num][0]
         try:
             cells = [cell.strip() for cell in next(reader)]
@@ -188,7 +188,7 @@ def _rows(
 
 
 def _trimmed(cells: list[str], width: int) -> list[str]:
-    """``cells`` without empty ones behind the first ``width``; [] where all are empty."""
+    """``cells`` without trailing empty ones beyond the first ``width``; [] if all are empty."""
     while len(cells) > width and not cells[-1]:
         cells.pop()
     return cells if any(cells) else []

@@ -40,15 +40,15 @@ class Target(Record):
 
 
 def observed_text(observable: str, value: float) -> str:
-    """A value of an observable for a line of progress; only degrees have a unit that goes without saying."""
+    """Return a value of an observable for a progress line; only degrees are given with their unit."""
     return f"{value:.1f}°" if is_angle(observable) else f"{value:.3g}"
 
 
 def experiment_of(observable: str) -> str:
-    """The experiment of a study in which ``observable`` is read, "drum" of "drum/dynamic_angle_deg"; "" for its own."""
+    """Return the experiment of ``observable``: "drum" for "drum/dynamic_angle_deg", "" for the study's own rig."""
     return observable.rpartition("/")[0]
 
 
 def is_angle(observable: str) -> bool:
-    """True for an observable in degrees, a single view (``…_deg@90``) included."""
+    """Return whether an observable is in degrees, including that of a single view (``…_deg@90``)."""
     return observable.partition("@")[0].endswith("_deg")

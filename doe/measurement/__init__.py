@@ -1,7 +1,6 @@
 """Measured data: a folder of conditions, replicates and parameter ranges, and the runs that repeat it.
 
-The format is described in ``README.md`` beside this file. What is read off data and off runs is read by the same
-functions.
+``README.md`` beside this file describes the format. The same functions read data and simulated runs.
 """
 
 from doe.measurement.load import load_measurement

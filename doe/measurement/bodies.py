@@ -1,6 +1,7 @@
-"""Measured bodies: what a balance, a caliper and a plate tell of single bodies, beside what is read off their pours.
+"""Measurements of single bodies with a balance, a caliper and a plate, in addition to the readings of their pours.
 
-``measurement.toml`` names the table, ``bodies = "bodies.csv"``. A row is one number of one component of the material:
+``measurement.toml`` names the table: ``bodies = "bodies.csv"``. Each row is one number for one component of the
+material:
 
     body,quantity,unit,mean,standard_error
     seed,mass,g,0.0712,0.0006
@@ -8,11 +9,12 @@
     seed,length_spread,1,0.08,0.01
     seed,restitution,1,0.47,0.02
 
-``mass``: the mean mass of a body, of a counted number weighed together. ``length``: the mean of the longest dimension.
-``length_spread``: its standard deviation from body to body over its mean. The others are of a body on a plate of the
-rig's material (``solver/single_body/plate_tests.py``): the force, over its weight, that sets it in motion along the
-plate (``apparent_static_friction``) and that keeps it sliding (``apparent_kinetic_friction``), held so that it does not
-turn; and the ``restitution`` of a fall of 20 cm after which it does not turn.
+``mass``: the mean mass of a body, from a counted number of bodies weighed together. ``length``: the mean of the longest
+dimension. ``length_spread``: the standard deviation of the longest dimension between bodies, divided by its mean. The
+other quantities are measured on a plate of the rig's material (``solver/single_body/plate_tests.py``): the force,
+divided by the body's weight, that sets it in motion along the plate (``apparent_static_friction``) and that keeps it
+sliding (``apparent_kinetic_friction``) while it is held so that it cannot turn; and the ``restitution`` in a fall of
+20 cm after which the body does not rotate.
 """
 
 from __future__ import annotations
@@ -38,12 +40,12 @@ COLUMNS = ("body", "quantity", "unit", "mean", "standard_error")
 
 @dataclass(frozen=True)
 class BodyQuantity:
-    """A number that can be measured of bodies: unit, what it is, and what it is of a declared component.
+    """A quantity that can be measured on single bodies: its unit, its description, and its value for a component.
 
-    ``of`` is None for what is simulated, by the plate test of the same name. ``relative``: on its logarithm, so that
-    factors add up. ``loads``: what two effects add to 1 adds up, as the loads on a contact do; what they take away are
-    factors. ``written``: unit in which it is asked for. ``how``: to measure it, and with which standard error on its
-    scale ``usual``.
+    ``of`` computes the value from a declared component; it is None for quantities that the plate test of the same name
+    simulates. ``relative``: effects are added on the logarithm, so that factors add up. ``loads``: what two effects add
+    to 1 is added, as the loads on a contact are; reductions are multiplied. ``written``: the unit in which the user is
+    asked for the quantity. ``how``: how to measure it; ``usual``: the usual standard error on its scale.
     """
 
     unit: str
@@ -56,7 +58,7 @@ class BodyQuantity:
     loads: bool = False
 
     def on_scale(self, x: float) -> float:
-        """``x`` on the scale on which effects add up."""
+        """Return ``x`` on the scale on which effects add up."""
         return math.log(x) if self.relative else x
 
 
@@ -119,7 +121,7 @@ QUANTITIES: Mapping[str, BodyQuantity] = {
 
 @dataclass(frozen=True)
 class MeasuredBody(Record):
-    """One number of the component ``body``, SI: its mean and the standard error of that."""
+    """One quantity of the component ``body``: its mean and the standard error of the mean, SI."""
 
     body: str
     quantity: str
@@ -133,12 +135,12 @@ class MeasuredBody(Record):
 
     @property
     def deviation(self) -> float:
-        """Its standard error there."""
+        """The standard error on that scale."""
         return self.standard_error / self.mean if QUANTITIES[self.quantity].relative else self.standard_error
 
 
 def bodies_of(scenes: Sequence[Scene], asked: Sequence[MeasuredBody]) -> Array:
-    """What each of ``scenes``, with the effects in it, has in place of ``asked``, SI, (n, q)."""
+    """Value of each quantity in ``asked`` in each of ``scenes``, with the effects of the scene; SI, shape (n, q)."""
     found, simulated = np.zeros((len(scenes), len(asked))), []
     for k, scene in enumerate(scenes):
         bodies = {body.name: body for body in actual(scene).bodies}
@@ -149,7 +151,7 @@ def bodies_of(scenes: Sequence[Scene], asked: Sequence[MeasuredBody]) -> Array:
             else:
                 found[k, j] = of(bodies[one.body])
     if simulated:
-        from solver import PlateTest, plate_tests  # they bring Taichi, which a table that is read does not need
+        from solver import PlateTest, plate_tests  # imports Taichi, which reading a table does not need
 
         tests = [PlateTest(scenes[k], asked[j].body, asked[j].quantity) for k, j in simulated]
         for place, x in zip(simulated, plate_tests(tests), strict=True):
@@ -158,7 +160,7 @@ def bodies_of(scenes: Sequence[Scene], asked: Sequence[MeasuredBody]) -> Array:
 
 
 def body_numbers(scenes: Sequence[Scene], asked: Sequence[MeasuredBody]) -> Array:
-    """The same on the scales on which effects add up, (n, q)."""
+    """The same as :func:`bodies_of`, on the scales on which effects add up, shape (n, q)."""
     found = bodies_of(scenes, asked)
     for j, one in enumerate(asked):
         scale = QUANTITIES[one.quantity].on_scale
@@ -167,7 +169,7 @@ def body_numbers(scenes: Sequence[Scene], asked: Sequence[MeasuredBody]) -> Arra
 
 
 def read_bodies(path: Path, scene: Scene) -> tuple[MeasuredBody, ...]:
-    """The table in ``path`` of the bodies of ``scene``; none of the rows that are comments.
+    """Read the table in ``path``, which describes the bodies of ``scene``; comment rows are skipped.
 
     Raises
     ------

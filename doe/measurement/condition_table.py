@@ -1,9 +1,10 @@
 """A ``[[condition]]`` of ``measurement.toml`` (:class:`ConditionTable`) → the scene that repeats it.
 
 The feed of a rig begins at its opening, so region_z must begin there. ``duration`` is the time from the first body to
-the reading; the run is read then, at rest or not. ``batch_interval`` becomes the interval at which a run decides. A
-batch holds what the interval after it feeds, the first one at time 0. The shipped pours show it: t10 of the fast one of
-trefoil_1 is 177.5 ± 1.8 ms, simulated so 177.6 ± 1.2 ms, and 197.5 ms with batches of what was due before.
+the reading; the run is read then, at rest or not. ``batch_interval`` becomes the interval at which a run is sampled and
+makes its decisions. Each batch holds what is to be fed in the interval that follows it; the first batch is fed at
+time 0. The shipped pours confirm this: the measured t10 of the fast pour of trefoil_1 is 177.5 ± 1.8 ms; simulated in
+this way it is 177.6 ± 1.2 ms, but 197.5 ms if each batch holds what was due in the interval before it.
 """
 
 from __future__ import annotations
@@ -36,9 +37,9 @@ from solver import (
 )  # fmt: skip
 
 AS_THEY_ARE = ("protocol", "rate", "region_radius")
-"""Keys of ``[condition.insertion]`` with the names of ours."""
+"""Keys of ``[condition.insertion]`` that have the same names as our parameters."""
 FEED_SLACK = 1e-4
-"""By how much [m] region_z may begin beside the feed opening."""
+"""Largest distance [m] between the start of region_z and the feed opening."""
 
 
 class FeedTable(TomlTable):
@@ -99,14 +100,17 @@ class ConditionTable(TomlTable):
 
 
 def in_rig(base: Scene, name: str) -> Scene:
-    """``base`` in the rig ``name``, with that rig's defaults; not checked as a whole."""
+    """Return ``base`` in the rig ``name`` with that rig's defaults; the scene as a whole is not checked."""
     scene = base if name == base.rig.name else with_rig(base, name)
     pour_rig(scene)
     return scene
 
 
 def condition_scene(base: Scene, entry: ConditionTable, measured: Sequence[MeasuredParameter]) -> Scene:
-    """The scene of a condition: ``base`` with its rig and insertion, and what was ``measured`` within its range."""
+    """Return the scene of a condition: ``base`` in its rig, with its insertion and the ``measured`` parameters.
+
+    A parameter without a measured mean keeps its declared value if that lies within its range (:func:`_start`).
+    """
     bare = in_rig(base, entry.rig)
     settings: dict[str, Any] = {f"rig.{key}": value for key, value in entry.rig_parameters.items()}
     if entry.domain is not None:
@@ -126,14 +130,17 @@ def condition_scene(base: Scene, entry: ConditionTable, measured: Sequence[Measu
 
 
 def turned(scene: Scene) -> Scene:
-    """``scene`` with its rig turned by 180° on the bench: what stays with the bench acts the other way in its frame."""
+    """Return ``scene`` with its rig turned by 180° on the bench: effects fixed to the bench act in reverse on the rig.
+
+    Their amplitudes change sign, because positions are given in the rig's own frame.
+    """
     paths = [f"effect.{name}.{one}" for name, kind in EFFECTS.items() if kind.on_bench for one in kind.amplitudes]
     found = {path: float(value(scene, path)) for path in paths}
     return with_values(scene, {path: -amplitude for path, amplitude in found.items() if amplitude != 0.0})
 
 
 def _start(parameter: MeasuredParameter, declared: float) -> float:
-    """The mean; without one the declared value, or the middle of the range where that is outside."""
+    """Return the mean; without one, the declared value, or the middle of the range if that value lies outside it."""
     if parameter.mean is not None:
         return parameter.mean
     inside = parameter.low <= declared <= parameter.high
@@ -155,7 +162,7 @@ def _insertion(table: FeedTable) -> dict[str, Any]:
 
 
 def _duration(entry: ConditionTable, scene: Scene) -> dict[str, Any]:
-    """``duration`` stands with the insertion or in the condition itself; a run may take at least as long."""
+    """Settings for ``duration``, given in the insertion or in the condition; max_time is raised to it if needed."""
     stated = [duration for duration in (entry.duration, entry.insertion.duration) if duration is not None]
     if len(stated) > 1:
         raise MeasurementError("duration: given in the condition and in its insertion; allowed: in one of the two")

@@ -1,14 +1,15 @@
-"""The numbers that describe the pile of a condition as a whole; of data and of runs by the same functions.
+"""Features that describe the whole pile of a condition, computed by the same functions from data and from runs.
 
-    scalars    the summaries of the condition (``summaries.py``): any data
-    profile    rings of the mean height: a scan, or heights listed over the radius
-    surface    heights of the covered area, texture, and where the pile leans: a scan
+    group      features                                                      needs
+    scalars    the summaries of the condition (``summaries.py``)             any data
+    profile    mean heights of rings                                         a scan, or heights listed over the radius
+    surface    heights of the covered area, texture, direction of leaning    a scan
 
-A run is seen as the data were. Both are seen in cells as wide as the scans' resolution, whose means over a quarter of a
-body's thickness are the pixels of a height map: a mean is not shifted by resolution or noise, as the highest point of a
-pixel is. Where only heights over the radius are listed, a run's rings are made of its heights at the listed places.
-Texture and classes of heights are left out where a scan is too coarse to see bodies, what depends on the axis where a
-scan does not know it.
+A run is processed as the data were. Heights are taken in cells as wide as the scans' resolution; the mean of the cells
+within a quarter of a body's thickness is one pixel of the height map. Unlike the highest point of a pixel, a mean is
+not shifted by resolution or noise. Where only heights over the radius are listed, a run's rings are computed from its
+heights at the listed radii. Texture and classes of heights are omitted where a scan is too coarse to show single
+bodies, and features that depend on the axis where the scan's axis is unknown.
 """
 
 from __future__ import annotations
@@ -49,21 +50,21 @@ Array = npt.NDArray[np.float64]
 
 SCALARS, PROFILE, SCAN = "scalars", "profile", "scan"
 OFFERS = (SCALARS, PROFILE, SCAN)
-"""What a measurement may offer; each holds the ones before."""
+"""What a measurement may offer, in ascending order; each includes those before it."""
 LISTED = "height_profile_m"
 PIXELS, CELLS = 4.0, 3
-"""Pixels of a height map along the thickness of a body, and cells along a pixel where no scan limits them."""
+"""Pixels of a height map per thickness of a body, and cells per pixel side where no scan limits the resolution."""
 FINE = 0.25
-"""Resolution up to which a scan shows single bodies, as a share of the diameter of the smallest member sphere."""
+"""Coarsest resolution at which a scan shows single bodies, as a share of the smallest member sphere's diameter."""
 ROUNDING = 1e-12
-"""Share of a length that a quotient of two may be off."""
+"""Relative rounding error allowed in a quotient of two lengths."""
 PER_RING = 20
-"""Radii in a ring over which listed heights are averaged."""
+"""Number of radii per ring at which listed heights are averaged."""
 
 
 @dataclass(frozen=True)
 class FeatureSet:
-    """Names of the features of one condition: the scalars, then the profile's, then the other ones of a scan."""
+    """Names of the features of one condition: scalars, then the profile, then the remaining features of a scan."""
 
     scalars: tuple[str, ...]
     profile: tuple[str, ...]
@@ -75,7 +76,7 @@ class FeatureSet:
         return self.scalars + self.profile + self.surface
 
     def offered(self, offer: str) -> int:
-        """How many of the first ones data of the kind ``offer`` give."""
+        """Number of leading features that data of the kind ``offer`` provide."""
         parts = (self.scalars, self.profile, self.surface)
         return sum(len(part) for part in parts[: OFFERS.index(offer) + 1])
 
@@ -88,8 +89,8 @@ def offer_of(condition: Condition) -> str:
 
 
 def feature_set(condition: Condition) -> FeatureSet:
-    """The features of a run of ``condition``: all that its data may offer, and where they have only scalars, what they
-    would offer with a scan. Of a rig that leaves no heap, its scalars alone.
+    """Return the features of a run of ``condition``: all that its data may offer; with scalars alone, also those that a
+    scan would offer. For a rig that leaves no heap, only the scalars.
     """
     scalars = summary_names(condition)
     if not pour_rig(condition.scene).leaves_heap:
@@ -99,7 +100,7 @@ def feature_set(condition: Condition) -> FeatureSet:
         surface += HISTOGRAM_NAMES + TEXTURE_NAMES
     if all(one.on_axis for one in condition.surfaces.values()):
         surface += ASYMMETRY_NAMES
-    # A number that is read otherwise has another name, so that a store does not take one for the other.
+    # The name states how a number is read, so that a store never confuses two ways of reading it.
     cell, times = cells_of(condition)
     seen_as = f"@{times} x {1e3 * cell:.4g} mm" if resolution(condition) > 0.0 else ""
     places = _listed_places(condition)
@@ -110,11 +111,11 @@ def feature_set(condition: Condition) -> FeatureSet:
 
 
 def features_of_record(condition: Condition, record: Record, sight: Sight = PERFECT) -> Array:
-    """Values of ``feature_set(condition).names`` of a run of the condition's set-up, NaN where one cannot be read.
+    """Return the values of ``feature_set(condition).names`` for a run of the condition's set-up; NaN where unreadable.
 
-    ``sight``: what its surface is seen through.
+    ``sight``: camera direction and noise with which the surface is seen.
 
-    Scales are those of the declared scene, whatever acted in the run.
+    The scales are those of the declared scene, whichever effects acted in the run.
     """
     names, scalars = feature_set(condition), summaries_of_record(condition, record)
     if not names.profile:
@@ -129,7 +130,10 @@ def features_of_record(condition: Condition, record: Record, sight: Sight = PERF
 
 
 def features_of_data(condition: Condition) -> Array:
-    """Values of the features that the data offer, (replicates, n), by ``feature_set(condition)``; NaN where missing."""
+    """Return the features that the data offer, as named in ``feature_set(condition)``; NaN where missing.
+
+    Shape (replicates, n).
+    """
     names, scalars = feature_set(condition), summaries_of_data(condition)
     offer = offer_of(condition)
     if offer == SCALARS or not names.profile:
@@ -151,7 +155,7 @@ def features_of_data(condition: Condition) -> Array:
 
 
 def sight_of(condition: Condition) -> Sight:
-    """What the scans of ``condition`` were seen through: the camera that their shadows tell of, and their noise."""
+    """Return the sight of the scans of ``condition``: the camera direction that their shadows imply, and the noise."""
     half_width, (cell, _) = frame_of_scene(condition.scene).half_width, cells_of(condition)
     maps = [surface.height_map(half_width, cell) for surface in condition.surfaces.values()]
     noise = max((surface.noise for surface in condition.surfaces.values()), default=0.0)
@@ -159,12 +163,12 @@ def sight_of(condition: Condition) -> Sight:
 
 
 def seen_surface(condition: Condition, replicate: int) -> HeightMap:
-    """The upper surface of a replicate in the pixels of its condition, holes filled."""
+    """Return the upper surface of a replicate in the pixels of its condition, with holes filled."""
     return _seen(condition.surfaces[replicate], condition)
 
 
 def frame_of_scene(scene: Scene) -> Frame:
-    """Scales of the declared ``scene``: its charge, and the thickness of its bodies by mass."""
+    """Return the scales of the declared ``scene``: its charge, and its bodies' mean thickness, weighted by mass."""
     shares = np.array([body.mass_fraction for body in scene.bodies])
     density = float(shares.sum() / (shares / [body.density for body in scene.bodies]).sum())
     extents = [
@@ -187,7 +191,7 @@ def resolution(condition: Condition) -> float:
 
 
 def cells_of(condition: Condition) -> tuple[float, int]:
-    """Width of the cells in which piles of ``condition`` are seen [m], and cells along a pixel."""
+    """Return the width of the cells of the height maps of ``condition`` [m], and the number of cells per pixel side."""
     pixel, coarsest = frame_of_scene(condition.scene).thickness / PIXELS, resolution(condition)
     if coarsest == 0.0:
         return pixel / CELLS, CELLS
@@ -195,9 +199,10 @@ def cells_of(condition: Condition) -> tuple[float, int]:
 
 
 def ring_heights(places: Array, heights: Array, frame: Frame) -> Array:
-    """Mean heights [m] of the rings of ``frame`` from ``heights`` [m] listed at radii ``places`` [m], linear between.
+    """Return the mean heights [m] of the rings of ``frame`` from ``heights`` [m] listed at radii ``places`` [m].
 
-    Weighted by the area; the first height holds down to the axis, beyond the last place there is nothing.
+    Heights are interpolated linearly and weighted by area. Inside the first radius the first height applies; beyond the
+    last radius the height is zero.
     """
     inner = np.arange(len(frame.places))[:, None] * frame.ring_width
     radius = inner + (np.arange(PER_RING) + 0.5) / PER_RING * frame.ring_width
@@ -208,13 +213,13 @@ def ring_heights(places: Array, heights: Array, frame: Frame) -> Array:
 def _seen(surface: UpperSurface, condition: Condition, sight: Sight = PERFECT) -> HeightMap:
     cell, times = cells_of(condition)
     pixel = times * cell
-    # A trace less than a whole number of pixels: rounded up in cells, it would else be one cell too many now and then.
+    # Slightly less than a whole number of pixels: otherwise rounding up to cells would sometimes give one too many.
     half_width = (1.0 - ROUNDING) * pixel * np.ceil(frame_of_scene(condition.scene).half_width / pixel)
     return coarsened(without_holes(seen_through(surface.height_map(half_width, cell), sight)), times)
 
 
 def coarse_map(surface: UpperSurface, condition: Condition) -> HeightMap:
-    """The surface of a pile of ``condition`` in pixels a body's thickness wide, to be looked at."""
+    """Return the surface of a pile of ``condition`` in pixels one body thickness wide, for display."""
     seen, times = _seen(surface, condition), int(PIXELS)
     edge = len(seen.height) % (2 * times) // 2
     inner = slice(edge, len(seen.height) - edge)

@@ -1,4 +1,4 @@
-"""``measurement.toml`` and the files beside it → :class:`Measurement`, with one clear line for whatever is wrong."""
+"""``measurement.toml`` and the files beside it → :class:`Measurement`; each mistake is reported in one clear line."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from solver import (
 
 FILE = "measurement.toml"
 WRONG = (ParameterError, StudyFileError, MeasurementError, AssetNotFoundError)
-"""What the contents of a file can raise."""
+"""Exceptions that the contents of a file can raise."""
 
 
 class MeasurementFile(TomlTable):
@@ -62,7 +62,7 @@ class MeasurementFile(TomlTable):
 
 
 def load_measurement(folder: Path, follow_up: bool = False) -> Measurement:
-    """The measured data set in ``folder``. That of a ``follow_up`` may hold single bodies alone, and no condition.
+    """Read the measured data set in ``folder``. With ``follow_up`` it may hold only single bodies and no condition.
 
     Raises:
         MeasurementError: one line naming file, key, value and what is allowed.
@@ -77,24 +77,24 @@ def load_measurement(folder: Path, follow_up: bool = False) -> Measurement:
 
 
 def outside_files(folder: Path, table: Mapping[str, Any]) -> Iterator[tuple[str, Path]]:
-    """What reading the data set in ``folder`` would open elsewhere, but for what is shipped: by a path or by a link.
+    """Yield the files outside ``folder``, except shipped ones, that reading the data set would open by path or link.
 
     Args:
         folder: where ``measurement.toml`` is.
-        table: what it holds, be it well-formed or not.
+        table: its contents, well-formed or not.
 
-    Yields a key of that file, or the name of a link in the folder, and the file.
+    Each file comes with the key of ``measurement.toml``, or the name of the link in the folder, that leads to it.
     """
     root = folder.resolve()
-    # One after the other: what is outside need not be opened to be told.
+    # Lazily: a file outside need not be opened to be reported.
     for key, file in _named_files(folder, table):
-        # Not by Path.resolve, which raises for links that lead round in a circle.
+        # Not Path.resolve, which raises for circular links.
         if "\0" not in str(file) and not (found := Path(os.path.realpath(file))).is_relative_to(root):
             yield key, found
 
 
 def _named_files(folder: Path, table: Mapping[str, Any]) -> Iterator[tuple[str, Path]]:
-    """Every file but the shipped ones that is read beside ``measurement.toml``, and what leads there."""
+    """Every file except shipped ones that is read along with ``measurement.toml``, and the key that leads to it."""
     if isinstance(bodies := table.get("bodies"), str):
         yield "bodies", folder / bodies
     conditions = table.get("condition")
@@ -116,7 +116,7 @@ def _named_files(folder: Path, table: Mapping[str, Any]) -> Iterator[tuple[str, 
 
 
 def _of_material(folder: Path, name: object) -> Iterator[Path]:
-    """The file of a material that is not a shipped one, and the files that it names: meshes, and bodies with theirs."""
+    """The file of a material that is not shipped, and the files that it names: meshes, and bodies with their meshes."""
     path = folder / own_path(name) if isinstance(name, str) and "\0" not in name else None
     if path is not None and path.is_file():
         yield path
@@ -126,7 +126,7 @@ def _of_material(folder: Path, name: object) -> Iterator[Path]:
 
 
 def _of_body(path: Path) -> Iterator[Path]:
-    """A file that a material names and, of a body's, the mesh that it names."""
+    """A file that a material names and, if it is the file of a body, the files that this names in turn."""
     yield path
     if path.suffix == ".toml" and path.is_file():
         yield from (path.parent / own_path(file) for file in files_named_in(read_toml(path)) if isinstance(file, str))
@@ -186,7 +186,7 @@ def _read(folder: Path, table: Settings, outside: Sequence[str], follow_up: bool
 
 
 def _of_one_material(bodies: Sequence[MeasuredBody], conditions: Sequence[Condition]) -> None:
-    """Raise where a fitted condition has other bodies, those of a material of its own."""
+    """Raise if a measured body differs between fitted conditions because one of them has its own material."""
     scenes = [condition.scene for condition in conditions if condition.role == "fit"]
     for row in bodies:
         kinds = {next((one for one in scene.bodies if one.name == row.body), None) for scene in scenes}
@@ -195,7 +195,7 @@ def _of_one_material(bodies: Sequence[MeasuredBody], conditions: Sequence[Condit
 
 
 def _condition_entries(tables: Sequence[Settings], needed: bool) -> list[ConditionTable]:
-    """The conditions in their order; ``needed``: whether there has to be one."""
+    """The conditions in order; ``needed``: whether at least one is required."""
     given: list[ConditionTable] = []
     for table in tables:
         with _within(table.get("name")):
@@ -222,14 +222,14 @@ def _uncertainty(table: Mapping[str, float | str]) -> dict[str, float]:
 
 
 def _narrowed(before: Sequence[MeasuredParameter], after: Sequence[MeasuredParameter]) -> Iterator[str]:
-    """Notes on ranges that a rig does not take."""
+    """Notes on ranges that had to be narrowed because a rig does not accept all of their values."""
     for old, new in zip(before, after, strict=True):
         if old != new:
             yield f"{old.path}: range {old.low:g} … {old.high:g} narrowed to {new.low:g} … {new.high:g} by the rig"
 
 
 def _assumed(base: Scene, measured: Sequence[MeasuredParameter]) -> Iterator[str]:
-    """Notes on values that nobody measured and that are not calibrated either."""
+    """Notes on values that were neither measured nor are calibrated."""
     # The material file writes `materials.x`, parameter paths `material.x`.
     paths = {parameter.path for parameter in measured}
     for path in base.assumed:
@@ -239,7 +239,7 @@ def _assumed(base: Scene, measured: Sequence[MeasuredParameter]) -> Iterator[str
 
 @contextmanager
 def _within(name: str | None) -> Iterator[None]:
-    """Put the condition in front of an error about it."""
+    """Prefix an error with the condition that it is about."""
     try:
         yield
     except WRONG as error:

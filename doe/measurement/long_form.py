@@ -1,8 +1,8 @@
 """A condition's table in long form: replicate,observable,x,value[,unit] → one array per observable.
 
-Cells and numbers as `doe.table_file` reads them; ``#`` starts a comment. Numbers are SI, angles degrees, unless a
-column ``unit`` names another unit of the value. A scalar has an empty x, a curve a place. Missing rows are missing data
-(NaN).
+`doe.table_file` reads the cells and numbers; ``#`` starts a comment. Values are in SI units, angles in degrees, unless
+a column ``unit`` names another unit. The x of a scalar is empty; for a curve it is the place. Missing rows are missing
+data (NaN).
 """
 
 from __future__ import annotations
@@ -23,9 +23,10 @@ Array = npt.NDArray[np.float64]
 MOST_BYTES = 50_000_000
 COLUMNS = ["replicate", "observable", "x", "value"]
 ANGLE = "angle_of_repose"
-"""Beginning of the names of all angles of repose, whatever they are read off; one flank may slope the other way."""
+"""Common prefix of the names of all angles of repose, whatever they are read off. They may be negative: one flank can
+slope the other way."""
 UNIT_SUFFIXES = ("m", "cm", "mm", "um", "s", "ms", "kg", "g", "mg", "deg", "rad")
-"""Endings by which a name is recognised as an observable in another unit."""
+"""Suffixes by which a name is recognised as an observable in another unit."""
 
 
 @dataclass(frozen=True)
@@ -41,16 +42,19 @@ class LongRow:
 
 @dataclass(frozen=True, eq=False)
 class LongForm:
-    """A table: number of replicates, and per observable its places (None: scalar) and values, (r,) or (r, k)."""
+    """A table: the number of replicates, and for each observable its places (None for a scalar) and its values.
+
+    Values have shape (r,) for a scalar and (r, k) for a curve.
+    """
 
     replicates: int
     values: dict[str, tuple[Array | None, Array]]
     unknown: tuple[str, ...]
-    """Names that are no observable, in order."""
+    """Names that are not observables, sorted."""
 
 
 def read_long_form(path: Path) -> LongForm:
-    """The table in ``path``; MeasurementError in one line naming file, line and what is allowed."""
+    """Read the table in ``path``; raises MeasurementError with one line naming file, line and what is allowed."""
     rows, unknown = [], set()
     for row in _rows(path):
         if isinstance(row, str):
@@ -74,7 +78,7 @@ def read_long_form(path: Path) -> LongForm:
 
 
 def _rows(path: Path) -> Iterator[LongRow | str]:
-    """Rows in order; of a row with an unknown observable its name."""
+    """Yield the rows in order; for a row with an unknown observable, only its name."""
     table = read_table(path, MOST_BYTES, MeasurementError, ":{}", comments=True)
     if not table.rows:
         return
@@ -127,7 +131,7 @@ def _finite(where: str, column: str, text: str, unit: str, number: Callable[[str
 
 
 def _refuse_wrong_unit(where: str, name: str) -> None:
-    """Refuse a name that only its unit keeps from being an observable; another unknown name is let pass."""
+    """Refuse a name that would be an observable but for its unit; other unknown names are accepted."""
     for right in all_names():
         known = named(right)
         if known is None or known.unit == "1":

@@ -1,4 +1,4 @@
-"""What a measured data set says: parameters with their ranges, and conditions with their observations. Frozen."""
+"""Contents of a measured data set as frozen dataclasses: parameters with ranges, conditions with observations."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Role = Literal["fit", "holdout"]
 
 @dataclass(frozen=True)
 class MeasuredParameter(Record):
-    """A parameter that calibration may move, SI: within ``low`` … ``high``, and what was measured independently."""
+    """A parameter that calibration may move within ``low`` … ``high``, and its independently measured value; SI."""
 
     path: str
     low: float
@@ -44,12 +44,12 @@ class Observation(Record):
     uncertainty: float | None
     """Standard deviation of one value where replicates cannot give it."""
     origin: Literal["table", "piles", "photographs", "profile"] = "table"
-    """Where the values come from: the file, the scanned or photographed piles, or the surface profile beside them."""
+    """Source of the values: the table, the scanned or photographed piles, or the surface profile in the table."""
 
 
 @dataclass(frozen=True, eq=False)
 class Condition:
-    """One set-up, poured ``replicates`` times. ``scene`` repeats it in a simulation."""
+    """One set-up, poured ``replicates`` times. ``scene`` reproduces it in a simulation."""
 
     name: str
     role: Role
@@ -57,9 +57,9 @@ class Condition:
     replicates: int
     observations: tuple[Observation, ...]
     mean_of: int = 1
-    """Pours behind each listed value: more than one where only their mean was published."""
+    """Number of pours of which each listed value is the mean; more than one where only means were published."""
     surfaces: Mapping[int, UpperSurface] = field(default_factory=dict)
-    """Upper surfaces of the piles by replicate, from 1 on."""
+    """Upper surfaces of the piles by replicate, counted from 1."""
     turned: bool = False
     """Whether the rig stood turned by 180° on its bench. Positions are those in the rig's own frame."""
 
@@ -94,12 +94,12 @@ class Measurement:
     parameters: tuple[MeasuredParameter, ...]
     conditions: tuple[Condition, ...]
     ignored: tuple[str, ...]
-    """What the folder holds and nothing here uses, each with the reason."""
+    """Contents of the folder that are not used, each with the reason."""
     notes: tuple[str, ...] = ()
-    """What was changed in reading, such as a range that was clipped."""
+    """Changes made while reading, such as a clipped range."""
     cross_check: tuple[CrossCheck, ...] = ()
     bodies: tuple[MeasuredBody, ...] = ()
-    """What was measured of single bodies."""
+    """Measurements of single bodies."""
 
     @property
     def fit(self) -> tuple[Condition, ...]:

@@ -1,12 +1,12 @@
-"""What was observed in one condition: by its table, scanned piles and photographs, and by a run, in one vocabulary.
+"""Observations of one condition, from its table, scanned piles and photographs or from a run, under the same names.
 
-What raw data give is computed from them, by the functions that read our runs: pile observables from scanned piles, and
-where there are none from photographs; the slopes in a drum from the listed surface profile. The table's values of those
-only serve as a cross-check.
+Raw data take precedence and are read by the functions that read our runs: pile observables come from scanned piles or,
+without them, from photographs; the slopes in a drum come from the listed surface profile. The table's values of these
+observables serve only as a cross-check.
 
-A reading of one replicate of the data, or of one run, is a number, or the values of a curve at the places that the data
-list. The slopes of a drum's free surface are taken over the listed places, in data and runs alike, where the data have
-the profile.
+A reading of one replicate of the data, or of one run, is a number or the values of a curve at the places that the data
+list. Where the data include the surface profile of a drum, its slopes are taken over the listed places, in data and
+runs alike.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ Origin = Literal["table", "piles", "photographs", "profile"]
 
 PROFILE = "surface_profile_m"
 CORE = 10.0e-3
-"""Half width [m] within which, ends excluded, ``slope_core_deg`` is taken."""
+"""Half width [m], ends excluded, of the range over which ``slope_core_deg`` is taken."""
 SLOPES = {"slope_deg": np.inf, "slope_core_deg": float(np.nextafter(CORE, 0.0))}
-"""Slopes of the profile: name → largest |x| [m] of the places that count."""
+"""Slopes of the profile: name → largest |x| [m] of the places used."""
 
 
 def read_observations(
@@ -44,8 +44,10 @@ def read_observations(
     scene: Scene,
     uncertainty: Mapping[str, float],
 ) -> tuple[int, tuple[Observation, ...], tuple[CrossCheck, ...], tuple[str, ...]]:
-    """Replicates, observations, cross-checks, and what was ignored, of the condition ``name``; ``photographed``: what
-    was read off its pictures."""
+    """Return the number of replicates, observations, cross-checks and ignored items of the condition ``name``.
+
+    ``photographed``: the readings of its photographs.
+    """
     table = read_long_form(table_path)
     ignored = [f"{table_path.name}: {unknown}: no such observable" for unknown in table.unknown]
     scanned = max(table.replicates, *pile_paths, 0)
@@ -97,7 +99,7 @@ def read_observations(
 
 
 def readings_of_data(condition: Condition, replicate: int) -> Readings:
-    """Readings of one replicate of the data, numbered from 1; NaN where nothing was measured."""
+    """Return the readings of one replicate of the data, numbered from 1; NaN where nothing was measured."""
     return {
         observation.observable: float(row) if np.ndim(row) == 0 else row
         for observation in condition.observations
@@ -106,7 +108,7 @@ def readings_of_data(condition: Condition, replicate: int) -> Readings:
 
 
 def readings_of_record(condition: Condition, record: Record) -> Readings:
-    """The same readings of a run, whatever its outcome; NaN where one cannot be read."""
+    """Return the same readings from a run, whatever its outcome; NaN where one cannot be read."""
     places = {observation.observable: observation.x for observation in condition.observations}
     readings: Readings = observe_named(record, places)
     x = places.get(PROFILE)
@@ -117,12 +119,15 @@ def readings_of_record(condition: Condition, record: Record) -> Readings:
 
 
 def slope_of_profile(name: str, x: Array, height: Array) -> float:
-    """Slope [°] called ``name`` of the surface ``height`` [m] at ``x`` [m], (k,) each; NaN below three places."""
+    """Return the slope [°] called ``name`` of the surface ``height`` [m] at ``x`` [m], both of shape (k,).
+
+    NaN for fewer than three places.
+    """
     return slope_angle_deg(x, height, SLOPES[name])
 
 
 def _padded(given: Mapping[str, tuple[Array | None, Array]], replicates: int) -> Values:
-    """Values with rows of NaN for replicates that ``given`` does not reach."""
+    """Values, with rows of NaN for the replicates missing from ``given``."""
     return {
         name: (
             x,
@@ -149,7 +154,7 @@ def _observation(
 
 
 def _has_spread(observation: Observation) -> bool:
-    """True if two replicates or more have a value, or the uncertainty of one is stated."""
+    """True if at least two replicates have a value, or the uncertainty of a single value is stated."""
     return observation.uncertainty is not None or sum(_measured(observation.values)) >= 2
 
 

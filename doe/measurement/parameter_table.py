@@ -2,11 +2,11 @@
 
 "pair.grain.grain.static_friction" = { mean = 0.57, sd = 0.05, low = 0.47, high = 0.72 }
 
-Without low or high the range is mean ± 3 sd. A range is clipped to what the parameter may be at all.
+A missing low or high is taken from mean ± 3 sd. A range is clipped to the values that the parameter may have at all.
 
-A declared range says what a number may be by itself, and is narrowed to what the rigs of all conditions allow: a drum
-of 111 mL, for one, can be filled to 55 mL only. The end of a range that some condition's scene refuses is moved inward
-to the last value that it takes, by bisection.
+A declared range considers the parameter by itself; it is narrowed to what the rigs of all conditions allow. A drum of
+111 mL, for example, can be filled to 55 mL only. If the scene of a condition refuses an end of the range, that end is
+moved inward by bisection to the last value that the scene accepts.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from solver import (
 )
 
 RANGE_SDS = 3.0
-"""Half width of a range that is not stated, in standard deviations."""
+"""Half width, in standard deviations, of a range that is not stated."""
 
 
 class ParameterTable(TomlTable):
@@ -46,7 +46,7 @@ class ParameterTable(TomlTable):
 def read_parameters(
     table: Mapping[str, ParameterTable], scenes: Sequence[Scene]
 ) -> tuple[tuple[MeasuredParameter, ...], tuple[str, ...]]:
-    """Parameters of the table, each known in one of ``scenes`` at least, and notes on what was clipped."""
+    """Return the parameters of the table, each known in at least one of ``scenes``, and notes on clipped ranges."""
     found: dict[str, MeasuredParameter] = {}
     notes: list[str] = []
     for path, entry in table.items():
@@ -97,11 +97,11 @@ def _measured(parameter: Parameter, entry: ParameterTable, notes: list[str]) -> 
 
 
 BISECTIONS = 30
-"""A billionth of the range."""
+"""Number of bisections, which locate an end to about a billionth of the range."""
 
 
 def narrowed(parameter: MeasuredParameter, scenes: Sequence[Scene]) -> MeasuredParameter:
-    """``parameter`` with a range whose ends every one of ``scenes`` that has it takes."""
+    """Return ``parameter`` with its range narrowed so that all ``scenes`` that have it accept both ends."""
     ends = [parameter.low, parameter.high]
     for scene in scenes:
         if parameter.path not in parameters(scene):

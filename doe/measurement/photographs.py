@@ -1,10 +1,10 @@
-"""Photographs of a condition's piles → the view that they show, by the estimator of our runs.
+"""Photographs of a condition's piles → the view that they show, read by the same estimator as our runs.
 
-``images`` of a condition lists them: a file name of replicate 1, 2, …, or a :class:`PhotographTable` in its place.
+``images`` of a condition lists a file name for replicate 1, 2, …, or a :class:`PhotographTable` in its place.
 
-A picture gives ``angle_of_repose_deg@<azimuth>``, one view as a simulated pile has it too, and with ``pixel``
-``apex_height_m``. Left and right alone are not taken: they add nothing to their mean but the difference between them,
-and which side is which depends on where the camera stood.
+A picture gives ``angle_of_repose_deg@<azimuth>``, a view that a simulated pile has as well, and with ``pixel`` also
+``apex_height_m``. The left and right angles are not used separately: beyond their mean they add only the difference
+between them, and which side is which depends on where the camera stood.
 """
 
 from __future__ import annotations
@@ -51,9 +51,9 @@ class PhotographTable(TomlTable):
 
 
 def photograph_values(folder: Path, images: Sequence[PhotographTable]) -> tuple[Values, tuple[str, ...]]:
-    """Name → (None, values per replicate) of every picture, and a line for each that shows no pile to read.
+    """Return name → (None, values per replicate) over all pictures, and a line for each without a readable pile.
 
-    Replicates without a picture are NaN. MeasurementError in one line for a picture that cannot be opened.
+    Replicates without a picture are NaN. Raises MeasurementError with one line for a picture that cannot be opened.
     """
     single: dict[tuple[str, int], float] = {}
     ignored = []
@@ -80,7 +80,7 @@ def photograph_values(folder: Path, images: Sequence[PhotographTable]) -> tuple[
 
 
 def _read(path: Path, image: PhotographTable) -> PhotographedPile | str:
-    """What the picture shows, or a line on why it shows no pile."""
+    """The pile in the picture, or a line on why none can be read."""
     try:
         read = read_photograph(open_picture(path), image.pixel, image.base_line)
     except PhotographError as error:

@@ -1,4 +1,4 @@
-"""Scanned piles: ``piles/<condition>_<k>.npz`` → the pile observables of replicate k, by the estimators of our runs.
+"""Scanned piles: ``piles/<condition>_<k>.npz`` → pile observables of replicate k, by the same estimators as our runs.
 
 xyz (n, 3) [m], radius (n,) [m], body (n,): the member spheres of the bodies on the plate.
 """
@@ -34,7 +34,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class PileSurface:
-    """The upper surface of a pile that is known by its spheres; a scanner that sees every point of it from above."""
+    """The upper surface of a pile given by its spheres, as a scanner that sees every point from above would show it."""
 
     spheres: Spheres
     grid: float = 0.0
@@ -52,7 +52,7 @@ PROFILE_PLACES = (np.arange(30) + 0.5) * 5e-3
 
 
 def pile_files(folder: Path, conditions: Iterable[str]) -> tuple[dict[str, dict[int, Path]], tuple[Path, ...]]:
-    """Files of ``folder/piles`` by condition and replicate, and those that belong to no condition."""
+    """Return the files of ``folder/piles`` by condition and replicate, and those that belong to no condition."""
     found: dict[str, dict[int, Path]] = {name: {} for name in conditions}
     strangers = []
     for path in sorted((folder / "piles").glob("*")):
@@ -65,12 +65,12 @@ def pile_files(folder: Path, conditions: Iterable[str]) -> tuple[dict[str, dict[
 
 
 def read_piles(files: Mapping[int, Path], scene: Scene) -> dict[int, Pile]:
-    """Scanned piles by replicate, of the bodies of ``scene``."""
+    """Read the scanned piles by replicate; they consist of the bodies of ``scene``."""
     return {replicate: read_pile(path, scene) for replicate, path in files.items()}
 
 
 def read_pile(path: Path, scene: Scene) -> Pile:
-    """One scanned pile; MeasurementError in one line naming file and array."""
+    """Read one scanned pile; raises MeasurementError with one line naming file and array."""
     xyz, radius, body = _arrays(path)
     try:
         return scanned_pile(scene, xyz.astype(np.float64), radius.astype(np.float64), body)
@@ -79,7 +79,7 @@ def read_pile(path: Path, scene: Scene) -> Pile:
 
 
 def pile_surfaces(files: Mapping[int, Path]) -> dict[int, PileSurface]:
-    """Upper surfaces of scanned piles by replicate; of whatever bodies, for from above one sees none."""
+    """Return the upper surfaces of scanned piles by replicate; bodies of any kind, as a surface does not show them."""
     found = {}
     for replicate, path in files.items():
         xyz, radius, body = _arrays(path)
@@ -103,7 +103,10 @@ def _arrays(path: Path) -> tuple[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray
 def pile_values(
     piles: Mapping[int, Pile], scene: Scene, replicates: int, listed: Mapping[str, Array | None]
 ) -> dict[str, tuple[Array | None, Array]]:
-    """Name → (places or None, values per replicate): what is read off every scan, and what the table ``listed``."""
+    """Return name → (places or None, values per replicate): what is read off every scan, and what the table lists.
+
+    Of the observables ``listed`` in the table, only those of a pile are read.
+    """
     wanted: dict[str, Array | None] = dict.fromkeys(name for name, known in OBSERVABLES.items() if known.scanned) | {
         "height_profile_m": PROFILE_PLACES
     }

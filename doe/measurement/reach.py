@@ -1,9 +1,9 @@
-"""What a measured data set can and cannot tell, before anything is simulated.
+"""What a measured data set can and cannot identify, before anything is simulated.
 
-Counting: every summary of a fitted condition is one equation, every free parameter one unknown; with no more equations
-than unknowns the model fits whatever it lacks. Resolution of a summary: standard error s/√n of its mean over n
-replicates and the 95 % half-width t₀.₉₇₅(n − 1) s/√n (Student 1908); for a single value 1.96 times its stated
-uncertainty.
+Counting: every summary of a fitted condition is one equation, every free parameter one unknown. With no more equations
+than unknowns, the model fits the data whichever effect it lacks. Resolution of a summary: the standard error s/√n of
+its mean over n replicates, and the 95 % half-width t₀.₉₇₅(n − 1) s/√n (Student 1908); for a single value, 1.96 times
+its stated uncertainty.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from doe.record import Record
 from solver import EFFECTS, Telltale, named
 
 DISCHARGE = ("discharge_", "discharged_mass_kg", "residual_mass_kg")
-"""Beginnings of the names of what is read off the flow out of a container."""
+"""Prefixes of the names of observables of the flow out of a container."""
 
 
 @dataclass(frozen=True)
 class SummaryResolution(Record):
-    """How well a condition's replicates fix the mean of one summary."""
+    """How precisely a condition's replicates determine the mean of one summary."""
 
     summary: str
     unit: str
     replicates: int
-    """With a value."""
+    """Number of replicates that have a value."""
     mean: float
     sd: float
     standard_error: float
@@ -44,13 +44,13 @@ class ConditionReach(Record):
     role: str
     replicates: int
     mean_of: int
-    """Pours behind each replicate."""
+    """Number of pours of which each replicate is the mean."""
     resolutions: tuple[SummaryResolution, ...]
 
 
 @dataclass(frozen=True)
 class Reach(Record):
-    """What the data can tell."""
+    """What the data can identify."""
 
     conditions: tuple[ConditionReach, ...]
     equations: int
@@ -58,7 +58,7 @@ class Reach(Record):
     unknowns: int
     """Free parameters."""
     measured: int
-    """Of these, those that were measured independently."""
+    """Number of these that were measured independently."""
     has_discharge: bool
     has_asymmetry: bool
     has_holdout: bool
@@ -68,7 +68,7 @@ class Reach(Record):
 
 
 def reach_of(measurement: Measurement) -> Reach:
-    """What ``measurement`` can tell; no simulation, no fit."""
+    """Return what ``measurement`` can identify; nothing is simulated or fitted."""
     conditions = tuple(_condition_reach(condition) for condition in measurement.conditions)
     fitted = {part for condition in measurement.fit for summary in summaries(condition) for part in summary.parts}
     seen = {telltale for name in fitted if (known := named(name)) is not None for telltale in known.telltales}

@@ -1,4 +1,4 @@
-"""Where in scanned piles a model is off: measured minus poured height over the plate."""
+"""Where a model deviates from scanned piles: measured minus poured height over the plate."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from doe.record import Record
 FloatArray = npt.NDArray[np.float64]
 
 LEAST_ERROR = 1e-4
-"""Standard error [m] below which no height is known: the plate far from the pile is bare in every pour."""
+"""Least standard error [m] assumed for a height: far from the pile the plate is bare in every pour, without scatter."""
 
 
 @dataclass(frozen=True)
 class HeightDifference(Record):
-    """Measured minus poured mean height (n, n) [m], rows along x, and the same in standard errors of the two means."""
+    """Measured minus poured mean height (n, n) [m], rows along x, and the same in standard errors of the difference."""
 
     height: FloatArray
     z: FloatArray
@@ -36,7 +36,7 @@ class ResidualMap(Record):
     measured
         Mean measured height (n, n) [m].
     before, after
-        To the calibrated base model, and to the final one.
+        Differences from the calibrated base model, and from the final one.
     """
 
     condition: str
@@ -48,7 +48,7 @@ class ResidualMap(Record):
 
 
 def height_difference(measured: FloatArray, poured: FloatArray) -> HeightDifference:
-    """Of measured (r, n, n) and poured (m, n, n) heights, with one standard deviation of a pour for both."""
+    """Return the difference of measured (r, n, n) and poured (m, n, n) heights, with a pooled SD of a pour for both."""
     r, m = len(measured), len(poured)
     step = measured.mean(axis=0) - poured.mean(axis=0)
     error = pooled_deviation(measured, poured) * np.sqrt(1.0 / r + 1.0 / m)
@@ -56,6 +56,6 @@ def height_difference(measured: FloatArray, poured: FloatArray) -> HeightDiffere
 
 
 def pooled_deviation(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Standard deviation within two samples (n, …), one for both."""
+    """Return the pooled standard deviation of two samples of shape (n, …)."""
     both = np.concatenate([one - one.mean(axis=0), other - other.mean(axis=0)])
     return np.asarray(np.sqrt((both**2).sum(axis=0) / (len(both) - 2)), dtype=np.float64)

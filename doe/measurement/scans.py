@@ -1,15 +1,15 @@
-"""Scanned surfaces: ``scans/<condition>_<k>.*`` → the height map of replicate k, on the axis of the rig.
+"""Scanned surfaces: ``scans/<condition>_<k>.*`` → the height map of replicate k, centred on the axis of the rig.
 
     .ply .stl           a surface; its facets are sampled
     .xyz .txt .csv      points x, y, z in the first three columns, with or without a header; a comma is a decimal sign
-                        where semicolons, tabs or blanks stand between the cells
+                        where semicolons, tabs or blanks separate the cells
     .npz                height (n, m), x (n,), y (m,); NaN where nothing was seen
-    .tif .tiff          16 bit, a column per x and a row per y from +y down; 0 where nothing was seen
+    .tif .tiff          16 bit; one column per x, one row per y, from +y downward; 0 where nothing was seen
 
-``[condition.scan]`` of ``measurement.toml`` says what the files do not (:class:`ScanSettings`).
+``[condition.scan]`` of ``measurement.toml`` states what the files do not (:class:`ScanSettings`).
 
-Only the upper surface is used: in cells as wide as the scan's resolution, the mean of what lies within ``SHELL`` cells
-of the highest point.
+Only the upper surface is used: in each cell, as wide as the scan's resolution, the mean height of the points within
+``SHELL`` cell widths of the highest one.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ Array = npt.NDArray[np.float64]
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 SURFACES, POINTS, ARRAYS, IMAGES = (".ply", ".stl"), (".xyz", ".txt", ".csv"), (".npz",), (".tif", ".tiff")
 SUFFIXES = (*SURFACES, *POINTS, *ARRAYS, *IMAGES)
-"""What the name of a scan's file may end in."""
+"""File name suffixes of scans."""
 AXIS_ERROR = 1.5e-3
-"""How well [m] a rig's axis is found in the coordinates of a scanner, where nothing is stated: a plumb bob's tip."""
+"""Error [m] of a rig's axis in the scanner's coordinates where none is stated: that of locating a plumb bob's tip."""
 MOST_BYTES = 300_000_000
 MOST_POINTS = 20_000_000
 SHELL = 2.0
 """Depth below the highest point of a cell, in cells, within which points count as upper surface."""
 FEWEST = 200
-"""Points of the smallest scan."""
+"""Least number of points in a scan."""
 PLATE_SHARE, PLATE_DEPTH = 0.2, 0.05
-"""Share of the points that has to lie on the bare plate where the plate is to be found, and how far off it
-they may be, as a share of the scan's height."""
+"""Share of the points that must lie on the bare plate for it to be found, and how far from it they may lie, as a
+share of the scan's height."""
 ROUNDS = 30
 
 
@@ -74,11 +74,11 @@ class ScanSettings:
 
 
 class UpperSurface(Protocol):
-    """What was seen of a pile from above."""
+    """A pile as seen from above."""
 
     @property
     def grid(self) -> float:
-        """Resolution [m]; 0 where there is no limit to it."""
+        """Resolution [m]; 0 where it is unlimited."""
 
     @property
     def on_axis(self) -> bool:
@@ -105,11 +105,11 @@ class Scan:
     grid: float
     """Resolution [m]: spacing of the points."""
     on_axis: bool
-    """Whether the axis is known; else x and y are about the centre of the volume."""
+    """Whether the axis is known; otherwise x and y are relative to the centre of the volume."""
     axis_error: float = AXIS_ERROR
     """Standard deviation of each coordinate of the axis [m]."""
     noise: float = 0.0
-    """Of a height [m]."""
+    """Standard deviation of a height [m]."""
 
     def height_map(self, half_width: float, pixel: float) -> HeightMap:
         """The upper surface within ``half_width`` [m] in pixels of ``pixel`` [m]; NaN where nothing was seen."""
@@ -128,7 +128,7 @@ class Scan:
 
 
 def scan_files(folder: Path, conditions: Iterable[str]) -> tuple[dict[str, dict[int, Path]], tuple[Path, ...]]:
-    """Files of ``folder/scans`` by condition and replicate, and those that belong to no condition."""
+    """Return the files of ``folder/scans`` by condition and replicate, and those that belong to no condition."""
     found: dict[str, dict[int, Path]] = {name: {} for name in conditions}
     strangers = []
     for path in sorted((folder / "scans").glob("*")):
@@ -144,12 +144,12 @@ def scan_files(folder: Path, conditions: Iterable[str]) -> tuple[dict[str, dict[
 
 
 def read_scans(files: Mapping[int, Path], settings: ScanSettings) -> dict[int, Scan]:
-    """Scans by replicate; MeasurementError in one line that names the file."""
+    """Read scans by replicate; raises MeasurementError with one line that names the file."""
     return {replicate: read_scan(path, settings) for replicate, path in files.items()}
 
 
 def read_scan(path: Path, settings: ScanSettings) -> Scan:
-    """One scan, on the plate and about the axis."""
+    """Read one scan, with heights above the plate and x, y relative to the axis."""
     try:
         if path.stat().st_size > MOST_BYTES:
             raise MeasurementError(f"{path.stat().st_size / 1e6:.0f} MB; allowed: up to {MOST_BYTES / 1e6:.0f} MB")
@@ -173,10 +173,10 @@ def read_scan(path: Path, settings: ScanSettings) -> Scan:
 
 
 def found_plate(points: Array) -> tuple[float, float, float]:
-    """The bare plate z = a + b x + c y of ``points`` (n, 3) [m]: the plane that the lowest points lie in.
+    """Return the bare plate z = a + b x + c y of ``points`` (n, 3) [m]: the plane of the lowest points.
 
-    Least squares, again and again, of the points within three of their median deviations of the last plane. Raises
-    MeasurementError where less than ``PLATE_SHARE`` of the points lie on it.
+    Least squares, repeated with the points within three scaled median deviations of the previous plane. Raises
+    MeasurementError if less than ``PLATE_SHARE`` of the points lie on it.
     """
     middle = points[:, :2].mean(axis=0)
     low = points[points[:, 2] <= np.quantile(points[:, 2], 0.3)]
@@ -186,7 +186,7 @@ def found_plate(points: Array) -> tuple[float, float, float]:
         plane = np.linalg.lstsq(design, low[:, 2], rcond=None)[0]
         off = points[:, 2] - plane[0] - (points[:, :2] - middle) @ plane[1:]
         below = off[off < 0.0]
-        # What lies under the plane is noise of the plate; what lies above may be grains.
+        # Points below the plane are noise of the plate; points above it may be grains.
         within = min(most, 3.0 * max(1.4826 * float(np.median(-below)) if below.size else 0.0, 1e-6))
         chosen = points[np.abs(off) <= within]
         if len(chosen) < 3 or (len(chosen) == len(low) and np.array_equal(chosen, low)):
@@ -201,14 +201,14 @@ def found_plate(points: Array) -> tuple[float, float, float]:
 
 
 def spacing(points: Array) -> float:
-    """Median distance of a point from its nearest neighbour in the plane [m], over a thousand points."""
+    """Return the median distance in the plane of a point to its nearest neighbour [m], over about a thousand points."""
     some = points[:: max(1, len(points) // 1000), :2]
     distance = cKDTree(points[:, :2]).query(some, k=2)[0][:, 1]
     return float(np.median(distance[distance > 0.0])) if (distance > 0.0).any() else 0.0
 
 
 def _volume_centre(points: Array, grid: float) -> Array:
-    """Mean place over the volume above the plate, of points that are as dense everywhere."""
+    """Horizontal centre (x, y) of the volume above the plate, for points of uniform density."""
     height = np.where(points[:, 2] > 2.0 * grid, points[:, 2], 0.0)
     if height.sum() <= 0.0:
         raise MeasurementError("nothing lies on the plate; state scan.axis = [x, y]")
@@ -216,7 +216,7 @@ def _volume_centre(points: Array, grid: float) -> Array:
 
 
 def _points(path: Path, settings: ScanSettings) -> tuple[Array, float | None]:
-    """Points (n, 3) [m] and, of a regular grid, its spacing [m]."""
+    """Points (n, 3) [m], and the spacing [m] where the file gives one."""
     suffix = path.suffix.lower()
     if suffix in SURFACES:
         surface, resolution = _of_surface(path)
@@ -229,7 +229,7 @@ def _points(path: Path, settings: ScanSettings) -> tuple[Array, float | None]:
 
 
 def _of_surface(path: Path) -> tuple[Array, float]:
-    """Corners of a surface with points on its facets, and the spacing of the corners; in the unit of the file."""
+    """The vertices of a surface, points on its facets, and the spacing of the vertices, in the unit of the file."""
     import trimesh
 
     try:
@@ -249,7 +249,7 @@ def _of_surface(path: Path) -> tuple[Array, float]:
 
 
 def _sampled(triangles: Array) -> Array:
-    """Points inside triangles (n, 3, 3), so dense that none is further from the next than the median edge."""
+    """Points in triangles (n, 3, 3), dense enough that neighbours are no further apart than the median edge."""
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
     longest = np.max([np.linalg.norm(b - a, axis=1), np.linalg.norm(c - b, axis=1), np.linalg.norm(a - c, axis=1)], 0)
     edge = max(float(np.median(longest)), float(np.ptp(triangles.reshape(-1, 3), axis=0).max()) / 1000.0)
@@ -284,7 +284,7 @@ def _of_table(path: Path) -> Array:
 
 
 def _decimal_comma(row: str) -> bool:
-    """Whether a comma in ``row`` is a decimal sign: something else stands between the cells."""
+    """Whether a comma in ``row`` is a decimal sign, because something else separates the cells."""
     cells = row.split()
     return ";" in row or (len(cells) >= 3 and all(cell.count(",") == cell.strip(",").count(",") <= 1 for cell in cells))
 

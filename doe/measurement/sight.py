@@ -1,8 +1,8 @@
-"""What a surface is seen through: a camera aslant, from which some of it is hidden, and the noise of a height.
+"""How a scanner sees a surface: an oblique camera, from which parts are hidden, and the noise of a height.
 
-A scanner that sees the plate from one side misses what stands behind something higher. Where its camera stands is told
-by the holes of its scans themselves: of all directions that one whose shadows, cast by the scanned surface, cover the
-holes best (share of the union that is in both). Nothing is assumed where no direction covers ``COVERED`` of it.
+A scanner that looks at the plate from one side misses whatever stands behind something higher. The direction of its
+camera is inferred from the holes in its scans: it is the direction whose shadows, cast by the scanned surface, overlap
+the holes best (intersection over union). If no direction has an overlap above ``COVERED``, no camera is assumed.
 """
 
 from __future__ import annotations
@@ -21,16 +21,19 @@ Bools = npt.NDArray[np.bool_]
 
 AZIMUTHS = tuple(math.radians(15.0 * k) for k in range(24))
 ELEVATIONS = tuple(math.radians(5.0 * k) for k in range(17, 5, -1))
-"""Directions that are tried [rad]: from 85° to 30° above the plate."""
+"""Elevations that are tried [rad], from 85° down to 30° above the plate."""
 COVERED = 0.25
-"""Least share for a camera; holes at random are covered by a few per cent."""
+"""Least overlap (intersection over union) that identifies a camera; for random holes it is a few per cent."""
 FEW = 0.003
-"""Share of holes below which nothing is hidden."""
+"""Share of holes up to which nothing counts as hidden."""
 
 
 @dataclass(frozen=True)
 class Sight:
-    """Direction of the camera [rad], ``elevation`` π/2 where nothing is hidden; standard deviation of a height [m]."""
+    """Direction of the camera [rad] and ``noise``, the standard deviation of a height [m].
+
+    ``elevation`` is π/2 where nothing is hidden.
+    """
 
     azimuth: float = 0.0
     elevation: float = 0.5 * math.pi
@@ -38,7 +41,7 @@ class Sight:
 
     @property
     def label(self) -> str:
-        """Its numbers."""
+        """Azimuth [°], elevation [°] and noise [mm] as text."""
         return f"{math.degrees(self.azimuth):.0f} {math.degrees(self.elevation):.0f} {1e3 * self.noise:.4g}"
 
 
@@ -46,7 +49,10 @@ PERFECT = Sight()
 
 
 def seen_through(surface: HeightMap, sight: Sight) -> HeightMap:
-    """``surface`` with NaN where ``sight`` shows nothing, and with its noise, which is the same for the same map."""
+    """Return ``surface`` as ``sight`` shows it: with noise, and NaN where it is hidden.
+
+    The noise is the same for all maps of one shape, so that a map always gives the same numbers.
+    """
     if sight == PERFECT:
         return surface
     height = surface.height
@@ -56,14 +62,14 @@ def seen_through(surface: HeightMap, sight: Sight) -> HeightMap:
 
 
 def hidden(surface: HeightMap, sight: Sight) -> Bools:
-    """Pixels from which the line to the camera meets something higher."""
+    """Return the pixels whose line of sight to the camera is blocked by something higher."""
     if not 0.0 < sight.elevation < 0.5 * math.pi:
         return np.zeros(surface.height.shape, dtype=bool)
     return _shadows(surface, sight.azimuth, (sight.elevation,))[0]
 
 
 def _shadows(surface: HeightMap, azimuth: float, elevations: Sequence[float]) -> list[Bools]:
-    """Hidden pixels by each of ``elevations``, from the highest down: the lower the camera, the farther the shadows."""
+    """Hidden pixels for each of ``elevations``, highest first: the lower the camera, the longer the shadows."""
     height, found, step = surface.height, [], 0
     rises = [math.tan(elevation) * surface.pixel for elevation in elevations]
     reach = [int(float(height.max(initial=0.0)) / rise) + 1 for rise in rises]
@@ -80,13 +86,13 @@ def _shadows(surface: HeightMap, azimuth: float, elevations: Sequence[float]) ->
 
 
 def found_sight(scans: Sequence[HeightMap], noise: float) -> Sight:
-    """The sight of ``scans`` of one scanner, NaN where it saw nothing, with a height's ``noise`` [m]."""
+    """Return the sight of a scanner from its ``scans``, NaN where it saw nothing, and the ``noise`` of a height [m]."""
     pairs = []
     for scan in scans:
         missing = np.isnan(scan.height)
         rows, columns = (np.flatnonzero(~missing.all(axis=axis)) for axis in (1, 0))
         if rows.size and columns.size:
-            # Beyond what was scanned at all nothing is hidden.
+            # Outside the scanned rectangle, missing pixels are not shadows.
             window = np.ix_(*(np.arange(kept[0], kept[-1] + 1) for kept in (rows, columns)))
             pairs.append(
                 (HeightMap(without_holes(scan).height[window], scan.radius[window], scan.pixel), missing[window])

@@ -1,15 +1,15 @@
-"""The vector by which data and runs are compared: at most twelve numbers per condition, chosen before any is looked at.
+"""The vector by which data and runs are compared: at most twelve numbers per condition, chosen without looking at them.
 
-The choice depends on the names (and places) that the data offer and on nothing else:
+The choice depends only on the names (and places) that the data offer:
 
 1. the scalars of ``PREFERRED`` that are offered, in that order, up to ``MOST``; ``flank_asymmetry_deg`` is the left
    angle of repose minus the right one;
-2. other scalars, by name, except those that repeat one of the first (single views and flanks where the mean over all
-   views is there, slopes of a profile that is there);
+2. other scalars, sorted by name, except those that repeat information already present (single views and flanks where
+   the mean over all views is offered, slopes of a profile that is offered);
 3. while there are fewer than ``LEAST``: values of the curves, in the order of ``CURVES``, at up to eight places spread
    evenly over the listed ones.
 
-The same code computes the vector of a replicate and that of a run, from the readings of `readings`.
+The same code computes the vector of a replicate and of a run (`readings_of_data`, `readings_of_record`).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Array = npt.NDArray[np.float64]
 
 MOST, LEAST = 12, 8
 PLACES = 8
-"""Places of a curve, at most."""
+"""Largest number of places taken from a curve."""
 ASYMMETRY = "flank_asymmetry_deg"
 LEFT, RIGHT, MEAN = "angle_of_repose_left_deg", "angle_of_repose_right_deg", "angle_of_repose_deg"
 PREFERRED = (
@@ -47,7 +47,7 @@ PREFERRED = (
     "discharge_t50_s",
     "solid_fraction",
 )
-"""t50 comes late: at a steady rate it lies between t10 and t90."""
+"""In order of preference. t50 comes late: at a steady rate it lies between t10 and t90."""
 CURVES = (PROFILE, "height_profile_m", "discharged_mass_kg")
 
 
@@ -58,19 +58,19 @@ class Summary:
     name: str
     unit: str
     parts: tuple[str, ...]
-    """Observables that it is made of; the second is subtracted from the first."""
+    """Observables that it is computed from; the second is subtracted from the first."""
     place: int | None = None
-    """Index of the place of a curve."""
+    """Index of the place on a curve; None for a scalar."""
 
     def of(self, readings: Readings) -> float:
-        """Its value."""
+        """Return its value."""
         values = [np.asarray(readings[part]) for part in self.parts]
         numbers = [float(value if self.place is None else value[self.place]) for value in values]
         return numbers[0] - sum(numbers[1:])
 
 
 def summaries(condition: Condition) -> tuple[Summary, ...]:
-    """The numbers of the vector of ``condition``, in order."""
+    """Return the summaries of ``condition``, in the order of the vector."""
     scalars = {name: o.unit for name, o in condition.offered.items() if o.x is None}
     offered = {name: Summary(name, unit, (name,)) for name, unit in scalars.items()}
     if LEFT in scalars and RIGHT in scalars:
@@ -84,25 +84,25 @@ def summaries(condition: Condition) -> tuple[Summary, ...]:
 
 
 def summary_names(condition: Condition) -> tuple[str, ...]:
-    """Names of the d numbers."""
+    """Return the names of the d summaries."""
     return tuple(summary.name for summary in summaries(condition))
 
 
 def summaries_of_data(condition: Condition) -> Array:
-    """Vectors of the replicates, shape (replicates, d); NaN where something was not measured."""
+    """Return the vectors of the replicates, shape (replicates, d); NaN where something was not measured."""
     chosen = summaries(condition)
     rows = [readings_of_data(condition, replicate) for replicate in range(1, condition.replicates + 1)]
     return np.array([[summary.of(row) for summary in chosen] for row in rows])
 
 
 def summaries_of_record(condition: Condition, record: Record) -> Array:
-    """Vector of a run of the condition's scene, shape (d,); NaN where something cannot be read."""
+    """Return the vector of a run of the condition's scene, shape (d,); NaN where something cannot be read."""
     readings = readings_of_record(condition, record)
     return np.array([summary.of(readings) for summary in summaries(condition)])
 
 
 def summary_uncertainties(condition: Condition) -> Array:
-    """Stated standard deviation of one value of each summary, shape (d,); NaN where none is stated."""
+    """Return the stated standard deviation of one value of each summary, shape (d,); NaN where none is stated."""
     stated = {name: o.uncertainty for name, o in condition.offered.items()}
     rows = [[stated[part] for part in summary.parts] for summary in summaries(condition)]
     return np.array([np.nan if None in row else float(np.linalg.norm(np.array(row, dtype=float))) for row in rows])
@@ -123,7 +123,7 @@ def _of_curve(condition: Condition, name: str, most: int) -> list[Summary]:
 
 
 def replicates_of(condition: Condition) -> MeasuredReplicates:
-    """What was measured in ``condition``."""
+    """Return the measured replicates of ``condition``."""
     return MeasuredReplicates(
         condition.name,
         summary_names(condition),
@@ -134,6 +134,6 @@ def replicates_of(condition: Condition) -> MeasuredReplicates:
 
 
 def complete_rows(condition: Condition) -> Array:
-    """The measured replicates of which every summary could be read, (r, d)."""
+    """Return the measured replicates for which every summary could be read, shape (r, d)."""
     data = summaries_of_data(condition)
     return np.asarray(data[np.isfinite(data).all(axis=1)], dtype=np.float64)

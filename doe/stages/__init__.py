@@ -1,4 +1,4 @@
-"""The stages of a study, one file each (``stage.py`` says how to add one)."""
+"""The stages of a study, one file each (``stage.py`` explains how to add one)."""
 
 from doe.errors import StudyFileError
 from doe.stages.ascent import AscentStage
@@ -24,12 +24,12 @@ OWN: tuple[Stage, ...] = (
     OptimumStage(),
     VerificationStage(),
 )
-"""In running order."""
+"""The stages of this package, in running order."""
 STAGES: Registry[Stage] = Registry("stage", OWN, instance_of(Stage))
 
 
 def stages_of(study: Study) -> tuple[Stage, ...]:
-    """The stages of ``study`` in running order; raises StudyFileError for a table of one that does not suit it."""
+    """Return the stages of ``study`` in running order; raises StudyFileError if a stage refuses its table."""
     order = list(OWN)
     for name, table in study.further.items():
         stage = STAGES[name]
@@ -44,5 +44,5 @@ def stages_of(study: Study) -> tuple[Stage, ...]:
 
 
 def planned_runs(study: Study, profile: Profile) -> dict[str, int]:
-    """Valid runs that each stage will make, replacements of failed runs not counted."""
+    """Return the number of valid runs that each stage will make, not counting replacements of failed runs."""
     return {stage.name: stage.planned_runs(study, profile) for stage in stages_of(study)}

@@ -1,4 +1,4 @@
-"""Steepest ascent: a walk along the fitted effects until the response passes the target, or comes nearest to all."""
+"""Steepest ascent: a walk along the fitted effects to bracket the target, or to come nearest to several targets."""
 
 from __future__ import annotations
 
@@ -36,18 +36,18 @@ from doe.studies.study import Factor, Study
 from doe.target import Target, observed_text
 
 WHOLE = 0.5
-"""Half-width of a region that is the whole of a factor's range, as a share of it."""
+"""Half-width, as a share of a factor's range, of a region that covers the whole range."""
 LEAST_SPREAD = 1e-6
-"""Least standard error of a target, over its own size or that of its response."""
+"""Least standard error of a target, relative to its own size or that of its response."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TargetWalk(Record):
-    """What a walk gave in the observable of one target; arrays of shape (steps,), NaN without enough valid runs."""
+    """Results of a walk in the observable of one target; arrays of shape (steps,), NaN without enough valid runs."""
 
     observable: str
     predicted: FloatArray
-    """By the first-order model of the screening."""
+    """Predicted by the first-order model of the screening."""
     means: FloatArray
     sd: FloatArray
     standard_error: FloatArray
@@ -58,11 +58,11 @@ class TargetWalk(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class AscentResult(Record):
-    """The path, what it gave in the observable of the first target, and the region of the next design.
+    """The path, its results in the observable of the first target, and the region of the next design.
 
-    ``means``, ``sd``, ``standard_error``: shape (steps,), NaN where no run is valid or only one. With several targets
-    ``others`` says the same of those beside the first, and ``approach`` where the walk comes nearest to all of them;
-    ``bracket`` is that of the first target in any case.
+    ``means``, ``sd``, ``standard_error``: shape (steps,); ``means`` is NaN where no run is valid, ``sd`` also where
+    only one is. With several targets, ``others`` holds the same for the further targets, and ``approach`` states where
+    the walk comes nearest to all of them; ``bracket`` always refers to the first target.
     """
 
     factors: tuple[Factor, ...]
@@ -84,14 +84,14 @@ class AscentResult(Record):
 
     @property
     def line(self) -> str:
-        """One line of what the ascent found."""
+        """The findings of the ascent in one line."""
         if self.approach is not None:
             return self.approach.words([walk.observable for walk in self.walks])
         return f"{', '.join(observed_text(self.observable, mean) for mean in self.means)}. {self.bracket.statement}"
 
     @property
     def walks(self) -> tuple[TargetWalk, ...]:
-        """What the walk gave, per target in the study's order; the first alone in results of before there were more."""
+        """Results of the walk per target, in the study's order; results of older versions have only the first."""
         first = TargetWalk(
             observable=self.observable,
             predicted=self.path.predicted,
@@ -110,9 +110,10 @@ def ascent(
     """Walk the selected factors from the low end of the response to the high end, or towards all targets at once.
 
     Direction, steps and prediction come from the effects on the targets' own observables, whichever estimator selected
-    the factors: the walk has to arrive at the measured values. ``noise``: observable → the pilot's, which knows the
-    spread of one run better than the few runs of a step. Of several targets the region is narrowed only where the walk
-    meets all of them, and its steps tell where: elsewhere their solutions may cross far from it.
+    the factors, because the walk has to arrive at the measured values. ``noise``: observable → noise in the pilot,
+    which estimates the spread of one run better than the few runs of a step. With several targets, the region is
+    narrowed only if the walk meets all of them and its steps resolve where; otherwise their solutions may cross far
+    from the walk.
     """
     by_name = {factor.name: factor for factor in study.factors}
     factors = tuple(by_name[chosen.name] for chosen in screened.selected)
@@ -188,7 +189,7 @@ def _path(factors: Sequence[Factor], models: Sequence[FirstOrder], steps: int) -
 
 
 def _walk(table: FloatArray, predicted: FloatArray, target: Target, noise: Noise, profile: Profile) -> TargetWalk:
-    """What a walk gave, of ``table`` of its runs, shape (steps, replicates)."""
+    """Results of a walk from the ``table`` of its runs, shape (steps, replicates)."""
     n = (~np.isnan(table)).sum(axis=1)
     means = np.array([row[~np.isnan(row)].mean() if k else math.nan for row, k in zip(table, n, strict=True)])
     return TargetWalk(
@@ -217,7 +218,7 @@ def _approach(walks: Sequence[TargetWalk], targets: Sequence[Target]) -> Approac
 
 
 def _notes(screened: ScreeningResult, targets: Sequence[Target]) -> tuple[str, ...]:
-    """Which of the directions are those of noise."""
+    """Notes on factors whose direction may be due to noise."""
     own = (screened.target_analysis, *screened.further_analyses.values())
     in_target = {name for analysis in own for name in analysis.significant()}
     whose = "the target's own observable" if len(targets) == 1 else "the observable of any target"

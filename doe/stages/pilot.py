@@ -1,7 +1,7 @@
-"""Pilot: how noisy is one pour at the reference setting, which estimator shows a change best, how many runs follow.
+"""Pilot: the noise of one pour at the reference setting, the choice of the estimator, and the sizes of later stages.
 
-A stage takes as many pours per row as the pilot's noise asks for to see one and the same effect. Every stage has its
-own rows, its own comparison and the spread of the observable that it reads:
+From the noise in the pilot, each stage gets as many pours per row as it needs to detect the same effect. Every stage
+has its own rows, its own comparison and the spread of the observable that it reads:
 
     screening, assumptions   main effect of the stage's design, all of its factors at once (Bonferroni); the estimator
     ascent, scan             difference of two means; the target's observable
@@ -43,14 +43,14 @@ from doe.studies.study import CALIBRATED, Study
 from doe.target import experiment_of, is_angle, observed_text
 
 REFERENCE = "reference"
-"""Label of the setting that nothing is changed in."""
+"""Label of the setting in which nothing is changed."""
 
 
 @dataclass(frozen=True)
 class StageSize(Record):
-    """Replicates per row of a stage: asked for by ``wanted``, taken, and the effect that those resolve.
+    """Replicates per row of a stage: ``needed`` for the effect ``wanted``, ``taken``, and the effect ``resolved``.
 
-    ``wanted`` and ``resolved`` in the unit of the observable, with chance 0.8 at level 0.05.
+    ``wanted`` and ``resolved`` are in the unit of the observable, with power 0.8 at level 0.05.
     """
 
     stage: str
@@ -61,7 +61,7 @@ class StageSize(Record):
 
     @property
     def statement(self) -> str:
-        """What the profile's limit costs."""
+        """The effect of the profile's limit in a sentence."""
         return (
             f"{self.stage}: {self.wanted:g}° takes {self.needed} pours per row; the profile allows {self.taken}, which "
             f"resolve {self.resolved:.2f}°."
@@ -72,8 +72,8 @@ class StageSize(Record):
 class PilotResult(Record):
     """Noise per estimator, the choice among them, and the sizes of the stages that follow.
 
-    ``estimator`` serves the screening; ``equal_variance`` compares the spread of the target's observable at the
-    reference setting and under the declared changes (None where that cannot be tested).
+    ``estimator`` is the response of the screening; ``equal_variance`` compares the spread of the target's observable at
+    the reference setting and under the declared changes (None where that cannot be tested).
     """
 
     settings: tuple[Setting, ...] = ()
@@ -90,7 +90,7 @@ class PilotResult(Record):
 
     @property
     def line(self) -> str:
-        """One line of what the pilot found."""
+        """The findings of the pilot in one line."""
         target, noise = next(iter(self.noise.items()))
         mean, sigma, low, high = (
             observed_text(target, value) for value in (noise.mean, noise.sigma, noise.low, noise.high)
@@ -108,7 +108,7 @@ class PilotStage(Stage):
     title = "Pilot"
 
     def planned_runs(self, study: Study, profile: Profile) -> int:
-        """The reference setting, and the declared changes."""
+        """Runs at the reference setting and at the declared changes."""
         return profile.pilot_runs * len(study.all_experiments) + profile.change_runs * len(study.changes)
 
     def run(self, chain: Chain, runner: Runner) -> PilotResult:
@@ -156,17 +156,17 @@ def pilot(study: Study, profile: Profile, runner: Runner, bias: Bias) -> PilotRe
 def sized(
     study: Study, profile: Profile, screening_sigma: float, target_sigma: float
 ) -> tuple[Profile, tuple[StageSize, ...]]:
-    """The profile with the replicates that ``resolution_deg`` asks for, and how each was found.
+    """Return the profile with the replicates that ``resolution_deg`` requires, and the size of each stage.
 
     ``screening_sigma`` and ``target_sigma``: spread of one pour in the screening's estimator and in the target's
-    observable [°]. Without ``resolution_deg`` the profile stays as it is.
+    observable [°]. Without ``resolution_deg`` the profile stays unchanged.
     """
     wanted = profile.resolution_deg
     if wanted is None:
         return profile, ()
     sizes, counts = [], {}
     for rule in _rules(study, screening_sigma, target_sigma):
-        # Pours that all agree leave nothing to resolve; two of them still show that they do.
+        # If all pours agree, there is nothing to resolve; two are still needed to show that they agree.
         needed = rule.needed(wanted, rule.sigma) if rule.sigma > 0 else 2
         taken = min(needed, profile.max_replicates)
         sizes.append(StageSize(rule.stage, wanted, needed, taken, rule.resolved(rule.sigma, taken)))
@@ -175,7 +175,7 @@ def sized(
 
 
 def _noise(table: Mapping[str, FloatArray], needed: Sequence[str], notes: list[str]) -> dict[str, Noise]:
-    """The noise of every estimator that read two pours; another one is noted, or refused if it is needed."""
+    """The noise of every estimator that could be read in two pours; any other is noted, or refused if it is needed."""
     found = {}
     for estimator, values in table.items():
         try:
@@ -190,7 +190,7 @@ def _noise(table: Mapping[str, FloatArray], needed: Sequence[str], notes: list[s
 def _choice(
     tables: Mapping[str, Mapping[str, FloatArray]], target: str, bias: Bias, notes: list[str]
 ) -> EstimatorChoice | None:
-    """The choice among the estimators of the target's kind (an angle, or not); None where none can be made."""
+    """The choice among the estimators of the target's kind (an angle, or not); None if no choice can be made."""
     candidates = [e for e in tables[REFERENCE] if is_angle(e) == is_angle(target) and not experiment_of(e)]
     groups = {name: {e: table[e] for e in candidates} for name, table in tables.items()}
     centre = groups.pop(REFERENCE)
@@ -218,7 +218,7 @@ def _equal_variance(groups: Mapping[str, FloatArray], notes: list[str]) -> Equal
 
 @dataclass(frozen=True)
 class _Rule:
-    """Size of one stage: replicates for an effect, and the effect that replicates resolve."""
+    """How one stage is sized: replicates needed for an effect, and the effect that a number of replicates resolves."""
 
     stage: str
     key: str

@@ -1,13 +1,15 @@
-"""Reach: whether any setting of the factors can bring an angle of repose near the target, before much is poured.
+"""Reach: can any setting of the factors bring an angle of repose near the target? Checked before much is poured.
 
-Friction and rolling friction raise an angle of repose, restitution lowers it. So the two corners of the ranges are
-poured in which every such factor is at its least or its most favourable end, the others at their reference. The study
-stops where the target ± 2 standard errors lies beyond the nearer corner's mean
+Friction and rolling friction raise an angle of repose, restitution lowers it. Therefore two corners of the ranges are
+poured: one with every such factor at the end that lowers the angle, one with every such factor at the end that raises
+it, the others at their reference. The study stops if the target ± 2 standard errors lies beyond the nearer corner's
+mean
 
     by more than the whole range between the two corners, and by more than 3 standard errors of that mean.
 
-A rough look that is made to be wrong on the side of going on: of a factor whose direction is another one than known
-here, and of interactions, the range between the corners is no bound, which is why the whole of it is asked for again.
+This rough check is designed to err on the side of going on. The range between the corners is not a bound if a factor
+acts in another direction than assumed here, or if factors interact; that is why the target must be off by a whole
+further range.
 """
 
 from __future__ import annotations
@@ -34,15 +36,15 @@ CORNERS = ("lowest angle", "greatest angle")
 
 @dataclass(frozen=True, kw_only=True)
 class ReachResult(Record):
-    """The observable at the corner that should give the lowest and at that of the greatest angle, against the target.
+    """The observable at the corners expected to give the lowest and the greatest angle, compared with the target.
 
-    ``standard_errors`` are those of the means, of the runs' own spread or the pilot's, whichever is larger. ``beyond``:
-    by how much the target ± 2 standard errors lies beyond the nearer mean; negative between the two; NaN where a
-    corner has no valid run.
+    ``standard_errors`` are those of the means, from the runs' own spread or the pilot's, whichever is larger.
+    ``beyond``: by how much the target ± 2 standard errors lies beyond the nearer mean; negative between the two; NaN if
+    a corner has no valid run.
     """
 
     factors: tuple[str, ...]
-    """Names of those whose direction is known."""
+    """Names of the factors whose direction is known."""
     observable: str
     corners: tuple[Sample, Sample]
     standard_errors: tuple[float, float]
@@ -54,19 +56,19 @@ class ReachResult(Record):
 
     @property
     def within(self) -> bool:
-        """Whether the study may go on."""
+        """Whether the study may continue."""
         low, high = (corner.mean for corner in self.corners)
         nearer = self.standard_errors[0 if abs(low - self.target) < abs(high - self.target) else 1]
         return not (self.beyond > abs(high - low) and self.beyond > 3.0 * nearer)
 
     @property
     def between(self) -> str:
-        """What the corners gave, e.g. "2.1° … 12.0°"."""
+        """The means at the corners, e.g. "2.1° … 12.0°"."""
         return " … ".join(observed_text(self.observable, mean) for mean in sorted(one.mean for one in self.corners))
 
     @property
     def line(self) -> str:
-        """One line of what the corners say."""
+        """The findings at the corners in one line."""
         goal = observed_text(self.observable, self.target)
         if math.isnan(self.beyond):
             return f"a corner of the factors has no valid pour, so what they reach is not told; target {goal}"
@@ -75,9 +77,9 @@ class ReachResult(Record):
 
 
 def reach(study: Study, profile: Profile, runner: Runner, noise: Noise) -> ReachResult | None:
-    """Pour the two corners; None where the target is no angle of repose, no direction is known, or none is wanted.
+    """Pour the two corners; None if the target is not an angle of repose, no direction is known, or no runs are wanted.
 
-    ``noise`` of the target's observable is the pilot's. Raises StatisticsError where the target is out of reach.
+    ``noise``: that of the target's observable in the pilot. Raises StatisticsError if the target is out of reach.
     """
     target, known = study.targets[0], of_known_direction(study)
     if not asked(study, profile):
@@ -112,13 +114,13 @@ def reach(study: Study, profile: Profile, runner: Runner, noise: Noise) -> Reach
 
 
 def asked(study: Study, profile: Profile) -> bool:
-    """Whether the corners are poured in this study."""
+    """Return whether the corners are poured in this study."""
     of_a_pile = study.targets[0].observable.startswith("angle_of_repose")
     return of_a_pile and profile.reach_runs > 0 and bool(of_known_direction(study))
 
 
 def of_known_direction(study: Study) -> tuple[Factor, ...]:
-    """The factors whose effect on an angle of repose has a known sign."""
+    """Return the factors whose effect on an angle of repose has a known sign."""
     return tuple(factor for factor in study.factors if _kind(factor) in DIRECTIONS)
 
 
@@ -149,7 +151,7 @@ class ReachStage(Stage):
     title = "Reach"
 
     def planned_runs(self, study: Study, profile: Profile) -> int:
-        """Both corners, if they are asked for."""
+        """Runs at both corners, if they are poured."""
         return len(CORNERS) * profile.reach_runs if asked(study, profile) else 0
 
     def run(self, chain: Chain, runner: Runner) -> ReachResult | None:

@@ -1,4 +1,4 @@
-"""The response over one assumption in steps, so that a reader sees what the calibration hangs on."""
+"""Scan: the response over steps of one assumption, which shows how much the calibration depends on it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ from doe.target import observed_text
 
 @dataclass(frozen=True, kw_only=True)
 class ScanResult(Record):
-    """Mean and spread of the target's observable at each value of ``path`` (SI); ``noise`` is None below two runs."""
+    """Mean and spread of the target's observable at each value of ``path`` (SI).
+
+    ``noise`` is None for fewer than two valid runs.
+    """
 
     path: str
     values: tuple[float, ...]
@@ -34,7 +37,7 @@ class ScanResult(Record):
 
     @property
     def line(self) -> str:
-        """One line of what the scan found."""
+        """The findings of the scan in one line."""
         pairs = ", ".join(
             f"{value:g} → {observed_text(self.observable, mean)}"
             for value, mean in zip(self.values, self.means, strict=True)
@@ -44,7 +47,7 @@ class ScanResult(Record):
 
 
 def scan(study: Study, profile: Profile, runner: Runner, noise: Noise) -> ScanResult | None:
-    """Run the scan of the study; None if it declares none. ``noise`` of the target's observable is the pilot's."""
+    """Run the scan of the study; None if it declares none. ``noise``: that of the target's observable in the pilot."""
     if study.scan_path is None or not study.scan_values:
         return None
     path = study.scan_path
@@ -73,7 +76,7 @@ class ScanStage(Stage):
     title = "Scan"
 
     def planned_runs(self, study: Study, profile: Profile) -> int:
-        """Every value."""
+        """Runs at every value."""
         return len(study.scan_values) * profile.scan_replicates
 
     def run(self, chain: Chain, runner: Runner) -> ScanResult | None:

@@ -1,4 +1,4 @@
-"""Screening: which factors move the response, in the design that the study names, and which go on."""
+"""Screening: which factors affect the response, in the design that the study names, and which are calibrated."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from doe.target import experiment_of, observed_text
 
 @dataclass(frozen=True)
 class NotTestable(Record):
-    """A factor that touches too few bodies to be tested."""
+    """A factor that affects too few bodies to be tested."""
 
     factor: str
     path: str
@@ -35,8 +35,8 @@ class NotTestable(Record):
 class ScreeningResult(Record):
     """Runs and analysis of a design for main effects.
 
-    ``analysis`` is of ``response`` (the estimator that the pilot chose), ``target_analysis`` of the target's own
-    observable, ``no_pile_analysis`` of the share of runs without a pile (None if none failed).
+    ``analysis`` is that of ``response`` (the estimator chosen by the pilot), ``target_analysis`` that of the target's
+    own observable, and ``no_pile_analysis`` that of the share of runs without a pile (None if no run failed).
     """
 
     response: str
@@ -50,17 +50,17 @@ class ScreeningResult(Record):
     no_pile_share: FloatArray
     no_pile_analysis: Screening | None
     further_analyses: dict[str, Screening] = field(default_factory=dict)
-    """Of the targets beside the first: observable → analysis."""
+    """Analyses of the further targets: observable → analysis."""
     not_testable: tuple[NotTestable, ...]
     selected: tuple[Selected, ...]
 
     @property
     def line(self) -> str:
-        """One line of what a screening found."""
+        """The findings of a screening in one line."""
         found = self.analysis.significant()
         text = f"significant: {', '.join(found) if found else 'none'}"
         error = self.analysis.deciding_error
-        # The factors are judged all at once (Holm); so is the effect that could have been seen.
+        # The factors are tested simultaneously (Holm), so the smallest detectable effect is simultaneous as well.
         if error is not None and math.isfinite(error.smallest_detectable_effect_bonferroni):
             size = observed_text(self.response, error.smallest_detectable_effect_bonferroni)
             text += f"; smallest effect seen, all factors at once, {size}"
@@ -75,7 +75,7 @@ class ScreeningResult(Record):
 
 
 def screening(study: Study, profile: Profile, runner: Runner, response: str) -> ScreeningResult:
-    """Run and analyse the design of the screening over the factors of the study."""
+    """Run and analyse the screening design over the factors of the study, and select the factors to calibrate."""
     untestable = not_testable(study, study.factors)
     result = main_effects(
         "screening",
@@ -96,7 +96,7 @@ def screening(study: Study, profile: Profile, runner: Runner, response: str) -> 
 
 
 def assumptions(study: Study, profile: Profile, runner: Runner, response: str) -> ScreeningResult | None:
-    """The same over what the source of the study does not state, in a design of their own; None without any."""
+    """Run and analyse the design over the assumptions: what the study's source does not state; None without any."""
     if not study.assumptions:
         return None
     design, replicates = study.assumption_design, profile.assumption_replicates
@@ -114,10 +114,10 @@ def main_effects(
     spare: Sequence[str] = (),
     further: Sequence[str] = (),
 ) -> ScreeningResult:
-    """Run the rows of a design and analyse response, target and share without a pile.
+    """Run the rows of a design and analyse the response, the target and the share of runs without a pile.
 
-    Columns of its table without a factor are dummies. ``spare`` names factors that may be given up, see
-    :func:`analysed`. ``further``: observables that are analysed as well, in whichever experiment they are read.
+    Columns of the table without a factor are dummies. ``spare``: factors that may be given up, see :func:`analysed`.
+    ``further``: observables that are also analysed, in whichever experiment they are read.
     """
     wanted = {"", *map(experiment_of, further)}
     experiments = tuple(name for name in study.all_experiments if name in wanted)
@@ -160,10 +160,10 @@ def analysed(
     dummies: Sequence[str],
     spare: Sequence[str],
 ) -> Screening:
-    """Analysis of a design; where rows without a valid run leave too few equations, ``spare`` factors become dummies.
+    """Return the analysis of a design; if rows without a valid run leave too few equations, ``spare`` become dummies.
 
-    Those are the factors that are not testable anyway; giving them up is said in the notes. Raises StatisticsError
-    where even that is not enough.
+    These are factors that are not testable anyway; a note states that they were given up. Raises StatisticsError if
+    even that is not enough.
     """
     try:
         return analyse_screening(design, names, values, dummies)
@@ -178,7 +178,7 @@ def analysed(
 
 
 def not_testable(study: Study, factors: Sequence[Factor]) -> tuple[NotTestable, ...]:
-    """Factors that touch fewer than ``MIN_BODIES`` bodies of the mixture."""
+    """Return the factors that affect fewer than ``MIN_BODIES`` bodies of the mixture."""
     found = []
     for factor in factors:
         bodies = bodies_touched(study.scene, factor.path)
@@ -189,13 +189,13 @@ def not_testable(study: Study, factors: Sequence[Factor]) -> tuple[NotTestable, 
 
 
 class ScreeningStage(Stage):
-    """Which factors act, and which go on."""
+    """Which factors have an effect, and which are calibrated."""
 
     name = "screening"
     title = "Screening"
 
     def planned_runs(self, study: Study, profile: Profile) -> int:
-        """Every row of the design."""
+        """Runs of every row of the design."""
         rows = len(study.screening_design.points(len(study.factors)).coded)
         return rows * profile.screening_replicates * len(study.all_experiments)
 
@@ -205,13 +205,13 @@ class ScreeningStage(Stage):
 
 
 class AssumptionStage(Stage):
-    """Which assumptions act."""
+    """Which assumptions have an effect."""
 
     name = "assumptions"
     title = "Assumptions"
 
     def planned_runs(self, study: Study, profile: Profile) -> int:
-        """Every row of the design, if there is anything assumed."""
+        """Runs of every row of the design, if there are any assumptions."""
         if not study.assumptions:
             return 0
         return len(study.assumption_design.points(len(study.assumptions)).coded) * profile.assumption_replicates

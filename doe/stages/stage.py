@@ -1,8 +1,8 @@
-"""What a stage of a study is to everything outside it: a name, the runs that it plans, and a result with one line.
+"""The interface of a stage of a study: a name, the runs that it plans, and a result with its findings in one line.
 
-To add one: an entry point ``stage.NAME`` of a package of one's own (``solver/plugins.py``) that names an object of
-:class:`Stage`. It runs in the studies whose file has a table ``[stage.NAME]``, after the stage that it names, with what
-was found before it; progress, store, result, report and page treat it like the stages of this package.
+To add a stage, declare in your own package an entry point ``stage.NAME`` (``solver/plugins.py``) that refers to an
+object of :class:`Stage`. It runs in the studies whose file has a table ``[stage.NAME]``, after the stage that it names,
+with the results found before it. Progress, store, result, report and page treat it like the stages of this package.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from doe.studies.study_result import StageResult, Stages
 
 Bias = dict[str, tuple[tuple[float, float], ...]]
-"""Estimator → its error [°] on piles of known angle, (mean, standard error) for each way to fill a cone with bodies."""
+"""Estimator → its error [°] on piles of known angle: (mean, standard error) for each way to fill a cone with bodies."""
 Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
 class Chain:
-    """What a stage may build on. ``profile`` has the replicates that the pilot asked for, once it has ended."""
+    """Inputs of a stage. Once the pilot has ended, ``profile`` has the replicates that it asked for."""
 
     study: Study
     profile: Profile
@@ -38,7 +38,7 @@ class Chain:
 
 @dataclass(frozen=True, kw_only=True)
 class FurtherResult(Record):
-    """What a stage of another package found: one line, named numbers or words, sentences, and its runs."""
+    """Findings of a stage of another package: one line, named numbers or words, sentences, and its runs."""
 
     line: str
     facts: dict[str, float | str]
@@ -54,23 +54,23 @@ class Stage(ABC):
     title: ClassVar[str]
     """Heading of its section in a report."""
     after: ClassVar[str] = "verification"
-    """Of a stage of another package: the stage that it follows."""
+    """For a stage of another package: the stage that it follows."""
 
     def check(self, study: Study, table: Mapping[str, Any]) -> None:
-        """Refuse a table ``[stage.NAME]`` with a StudyFileError; by default one that is not empty."""
+        """Raise StudyFileError for a table ``[stage.NAME]`` that does not fit; by default, for any non-empty table."""
         if table:
             raise StudyFileError(f"stage.{self.name}.{next(iter(table))}: unknown key; allowed: none")
 
     def planned_runs(self, study: Study, profile: Profile) -> int:
-        """Valid runs that it will make, replacements of failed runs not counted."""
+        """Return the number of valid runs that it will make, not counting replacements of failed runs."""
         return 0
 
     @abstractmethod
     def run(self, chain: Chain, runner: Runner) -> StageResult | None:
-        """Run and analyse it; None if the study does not declare it. ``runner`` may hold some of the runs only."""
+        """Run and analyse it; None if the study does not declare it. ``runner`` may return only some of the runs."""
 
 
 def ended(result: Found | None) -> Found:
-    """The result of an earlier stage."""
+    """Return the result of an earlier stage, which must exist."""
     assert result is not None, "a stage was run before the one that it builds on"
     return result

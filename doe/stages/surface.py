@@ -1,4 +1,4 @@
-"""Response surface: the runs of a design, a second-order model per target, and the optimum with its uncertainty."""
+"""Response surface: the runs of a design, a second-order model of each target, and the optimum with its uncertainty."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from doe.target import Target
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceResult(Record):
-    """Runs of the design and, per target in the study's order, model, ANOVA and canonical analysis."""
+    """Runs of the design and, for each target in the study's order, model, ANOVA and canonical analysis."""
 
     factors: tuple[Factor, ...]
     region: Region
@@ -38,25 +38,25 @@ class SurfaceResult(Record):
     anova: tuple[SurfaceAnova, ...]
     canonical: tuple[Canonical, ...]
     smallest_main_effect: tuple[float, ...]
-    """Per target: the change from low to high of any one factor that would have been seen with power 0.8."""
+    """Per target: the change from low to high of any one factor that would have been detected with power 0.8."""
 
     @property
     def line(self) -> str:
-        """One line of what the surface found."""
+        """The findings of the surface in one line."""
         a = self.anova[0]
         return f"R² {a.r_squared:.2f}, adjusted {a.r_squared_adjusted:.2f}, predicted {a.r_squared_predicted:.2f}"
 
 
 CONTRADICTION = 0.01
-"""Below this chance of their misfit several targets contradict each other, and identify nothing."""
+"""p of their joint misfit below which several targets contradict each other and identify nothing."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """What the targets say of one factor [SI].
+    """Estimate of one factor from the targets [SI].
 
-    ``low`` … ``high``: its 95 % interval where it is ``identified``, else the range that gives the target; NaN where
-    none does.
+    ``low`` … ``high``: its 95 % interval if it is ``identified``, otherwise the range that gives the target; NaN if no
+    value does.
     """
 
     value: float
@@ -69,8 +69,8 @@ class Estimate:
 class OptimumResult(Record):
     """The chosen setting: path → value [SI], and how it was found (one target: ``single``, several: ``compromise``).
 
-    ``posterior``: what all targets say together; None with more factors than it is computed for, and in results of
-    before there was one.
+    ``posterior``: the joint posterior of all targets; None with more factors than it is computed for, and in results of
+    older versions.
     """
 
     values: dict[str, float]
@@ -81,7 +81,7 @@ class OptimumResult(Record):
 
     @property
     def estimates(self) -> dict[str, Estimate]:
-        """Path → what is known of each factor. Of several targets the joint posterior says it, where there is one."""
+        """Path → estimate of each factor; with several targets from the joint posterior, where there is one."""
         joint = self.posterior if self.compromise is not None else None
         found = {}
         for k, factor in enumerate(self.factors):
@@ -97,7 +97,7 @@ class OptimumResult(Record):
 
     @property
     def line(self) -> str:
-        """One line of what the optimum is."""
+        """The optimum in one line."""
         values = ", ".join(f"{path} = {value:.4g}" for path, value in self.values.items())
         if self.compromise is not None:
             open_ = any(not estimate.identified for estimate in self.estimates.values())
@@ -108,7 +108,7 @@ class OptimumResult(Record):
 def surface(
     study: Study, profile: Profile, runner: Runner, factors: tuple[Factor, ...], region: Region
 ) -> SurfaceResult:
-    """Run the points of the study's design around the bracket and fit the model of each target."""
+    """Run the points of the study's design in ``region`` and fit the model of each target."""
     design = study.surface_design.points(len(factors)).coded
     natural = region.natural(design)
     settings = [
@@ -140,21 +140,21 @@ def surface(
 
 
 def _smallest_main_effect(model: Surface) -> float:
-    # Terms stand in the order 1, x₁, x₂, …; missing runs, and some designs, tell one factor worse than another.
+    # Terms are in the order 1, x₁, x₂, …; with missing runs and in some designs, factors differ in precision.
     worst = float(np.diag(model.information_inverse)[1 : 1 + len(model.names)].max())
     error = 2.0 * math.sqrt(model.mse * worst)
     return smallest_effect(error, model.df_residual)
 
 
 def optimum(study: Study, fitted: SurfaceResult) -> OptimumResult:
-    """The setting on the solution surface nearest the measured values, or the best compromise of several targets."""
+    """Return the setting on the solution surface nearest to the reference values, or the best compromise of targets."""
     return optimum_of(fitted.models, fitted.factors, study.targets, study.seed)
 
 
 def optimum_of(
     models: tuple[Surface, ...], factors: tuple[Factor, ...], targets: tuple[Target, ...], seed: int
 ) -> OptimumResult:
-    """The same by the models of the targets; ``seed``: of the refits that tell how far it scatters."""
+    """Return the optimum from the models of the targets; ``seed``: of the refits that give its scatter."""
     reference = np.array([float(factor.reference) for factor in factors])
     target = targets[0]
     single = find_optimum(models[0], target.mean, reference, seed=seed, target_standard_error=target.standard_error)
@@ -179,12 +179,12 @@ class SurfaceStage(Stage):
     title = "Response surface"
 
     def planned_runs(self, study: Study, profile: Profile) -> int:
-        """Every point of the design."""
+        """Runs at every point of the design."""
         points = len(study.surface_design.points(CALIBRATED).coded)
         return points * profile.surface_replicates * len(study.all_experiments)
 
     def run(self, chain: Chain, runner: Runner) -> SurfaceResult:
-        """See :func:`surface`; around where the ascent passed the target."""
+        """See :func:`surface`; in the region found by the ascent."""
         walked = ended(chain.found.ascent)
         return surface(chain.study, chain.profile, runner, walked.factors, walked.region)
 

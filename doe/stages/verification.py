@@ -1,4 +1,4 @@
-"""Verification: fresh pours at the optimum against every target."""
+"""Verification: fresh pours at the optimum, compared with every target."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from doe.target import Target, observed_text
 
 @dataclass(frozen=True, kw_only=True)
 class VerificationResult(Record):
-    """Fresh runs at ``values`` [SI] and, per target, the tests."""
+    """Fresh runs at ``values`` [SI] and the test of each target."""
 
     values: dict[str, float]
     settings: tuple[Setting, ...] = ()
@@ -26,11 +26,11 @@ class VerificationResult(Record):
     targets: tuple[Target, ...]
     tests: tuple[Verification, ...]
     smallest_difference: tuple[float, ...]
-    """Per target: the difference from the measured mean that would have been seen with power 0.8 (Welch)."""
+    """Per target: the difference from the measured mean that would have been detected with power 0.8 (Welch)."""
 
     @property
     def line(self) -> str:
-        """One line of what the verification found."""
+        """The findings of the verification in one line."""
         several = len(self.targets) > 1
         line = " ".join(
             f"{f'{target.observable}: ' if several else ''}{test.statement} Relative error "
@@ -47,7 +47,7 @@ class VerificationResult(Record):
 
 
 def verification(study: Study, profile: Profile, runner: Runner, values: dict[str, float]) -> VerificationResult:
-    """Run the optimum with seeds that no other stage used and compare with the measurement."""
+    """Run the optimum with seeds that no other stage has used, and compare the runs with the measurement."""
     settings = (Setting("optimum", dict(values), profile.verification_runs, study.all_experiments),)
     rows = runner.run("verification", settings)
     tests = tuple(verify(responses(rows, t.observable)[0], t.mean, t.sd, t.n, margin=t.margin) for t in study.targets)
@@ -79,7 +79,7 @@ class VerificationStage(Stage):
     title = "Verification"
 
     def planned_runs(self, study: Study, profile: Profile) -> int:
-        """As the profile says."""
+        """Runs as set in the profile, in every experiment."""
         return profile.verification_runs * len(study.all_experiments)
 
     def run(self, chain: Chain, runner: Runner) -> VerificationResult:

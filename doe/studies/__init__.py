@@ -1,1 +1,1 @@
-"""A study: what its file asks for, the chain of its stages, and what came of it."""
+"""A study: the contents of its file, the chain of its stages, and its results."""

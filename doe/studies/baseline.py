@@ -1,7 +1,7 @@
-"""Has a calibration moved against an earlier one? Verdicts, means, noise and parameters, each by an equivalence test.
+"""Comparison of a calibration with an earlier one: verdicts, means, noise and parameters, each by an equivalence test.
 
-"Same" means shown to lie within a margin, "moved" means shown to differ by more than chance and not shown to lie within
-it; in between nothing can be told from so few pours. Two runs of the same physics and seeds are equal in every bit.
+"Same": shown to lie within a margin. "Moved": shown to differ by more than chance, and not shown to lie within the
+margin. Otherwise the pours are too few to decide. Two runs with the same physics and seeds are equal in every bit.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from doe.studies.study_result import StudyResult
 Answer = Literal["same", "moved", "cannot tell"]
 Kind = Literal["verdict", "mean at the optimum", "SD between seeds", "parameter"]
 PARAMETER_MARGIN = 0.1
-"""Of a parameter's declared range: what a change has to stay within to be none."""
+"""Margin within which a parameter counts as the same, as a share of its declared range."""
 NOISE_MARGIN = 1.5
-"""Ratio of two standard deviations that is no change."""
+"""Margin within which the ratio of two standard deviations counts as no change."""
 ALPHA = 0.05
 HALF_WIDTHS = float(stats.norm.ppf(0.975))
-"""Half a 95 % interval over the standard error."""
+"""Half width of a 95 % interval, in standard errors."""
 
 
 class BaselineError(ValueError):
-    """The two results are not of one question; the message is one line, fit for a user."""
+    """The two results answer different questions; the message is one line that can be shown to a user."""
 
 
 @dataclass(frozen=True)
 class Compared(Record):
-    """One quantity of both results, and the answer with its reason.
+    """One quantity in both results, and the answer with its reason.
 
-    ``name``: path of the parameter, whose values are in SI, or the observable.
+    ``name``: path of the parameter (values in SI) or name of the observable.
     """
 
     kind: Kind
@@ -53,7 +53,7 @@ def compare(before: StudyResult, now: StudyResult) -> tuple[Compared, ...]:
     """Compare two finished calibrations of the same targets.
 
     Raises:
-        BaselineError: the targets are not the same.
+        BaselineError: the targets differ.
     """
     if before.verification.targets != now.verification.targets:
         raise BaselineError(
@@ -64,7 +64,7 @@ def compare(before: StudyResult, now: StudyResult) -> tuple[Compared, ...]:
 
 
 def moved(compared: tuple[Compared, ...]) -> tuple[Compared, ...]:
-    """Those that have moved."""
+    """Return the quantities that have moved."""
     return tuple(one for one in compared if one.answer == "moved")
 
 
@@ -84,7 +84,7 @@ def _verified(before: StudyResult, now: StudyResult) -> Iterator[Compared]:
 
 
 def _verdicts(old: Verdict, new: Verdict, means: Answer) -> Answer:
-    """From or to "cannot tell" chance alone can turn a verdict, so that the means decide whether it moved."""
+    """Chance alone can change a verdict from or to "cannot tell"; the means then decide whether it has moved."""
     if old == new:
         return "same"
     return "moved" if means == "moved" or "cannot tell" not in (old, new) else "cannot tell"
@@ -104,7 +104,7 @@ def _means(old: Sample, new: Sample, margin: float) -> tuple[Answer, str]:
 
 
 def _noise(before: StudyResult, now: StudyResult) -> Iterator[Compared]:
-    """Per observable of the pilot: the standard deviation between seeds, by F of the ratio of variances."""
+    """Per observable of the pilot: the standard deviation between seeds, by the F test of the variance ratio."""
     for name, new in now.pilot.noise.items():
         if (old := before.pilot.noise.get(name)) is not None:
             yield Compared("SD between seeds", name, old.sigma, new.sigma, *_spreads(old, new))
@@ -123,7 +123,7 @@ def _spreads(old: Noise, new: Noise) -> tuple[Answer, str]:
 
 
 def _parameters(before: StudyResult, now: StudyResult) -> Iterator[Compared]:
-    """Per parameter: where the target identifies it the values with their 95 % intervals, else the ranges that do."""
+    """Per parameter: its values with 95 % intervals where the targets identify it, else the ranges that give them."""
     old, new = before.optimum.estimates, now.optimum.estimates
     declared = {
         factor.path: float(factor.high) - float(factor.low)

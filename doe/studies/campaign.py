@@ -1,7 +1,7 @@
 """The whole chain of a study, pilot → reach → screening → … → verification (`doe.stages`).
 
-Whatever stages other packages add stand in it as well. While a stage runs, :class:`PartialStages` says what it would
-find if it ended now: its own analysis, over the runs that have ended so far.
+It includes the stages that other packages add. While a stage runs, :class:`PartialStages` gives the result that it
+would have if it ended now: its own analysis, applied to the runs finished so far.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from doe.studies.study import Study
 from doe.studies.study_result import AllStages, StageResult, Stages
 
 Analysis = Callable[[Runner], StageResult | None]
-"""A stage as a function of who makes its runs."""
+"""A stage as a function of the runner that makes its runs."""
 OnPartial = Callable[[str, StageResult], None]
 """Called with (stage, its result so far)."""
 
 LEAST_INTERVAL = 3.0
-"""Seconds between two partial results."""
+"""Least number of seconds between two partial results."""
 SHARE = 0.02
-"""Largest share of the time that the analyses may take."""
+"""Largest share of the time that partial analyses may take."""
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """A chain that ran to its end: the result of every stage, and the seconds that each took."""
+    """A completed chain: the result of every stage, and the time in seconds that each took."""
 
     stages: AllStages
     seconds: dict[str, float]
@@ -48,12 +48,12 @@ def run_campaign(
     on_begin: Callable[[str, Analysis], None] = lambda stage, analysis: None,
     on_result: Callable[[str, StageResult | None], None] = lambda stage, result: None,
 ) -> Campaign:
-    """Run every stage; ``on_stage`` is called with (stage, one line of what it found) as each ends.
+    """Run every stage; as each ends, ``on_stage`` is called with (stage, its findings in one line).
 
     ``on_begin`` is called with (stage, its analysis as a function of a runner) before a stage, ``on_result`` with
     (stage, its result or None) after it.
 
-    Raises StudyStopped where what the runs of a stage gave cannot be analysed.
+    Raises StudyStopped if the results of the runs of a stage cannot be analysed.
     """
     seconds: dict[str, float] = {}
     counted, found = CountingRunner(runner), Stages()
@@ -75,12 +75,12 @@ def run_campaign(
 
 
 class CountingRunner:
-    """A runner that counts the runs that it was given, failed ones included."""
+    """A runner that counts the runs that another runner returns, including failed ones."""
 
     def __init__(self, runner: Runner) -> None:
         self._runner, self.runs = runner, 0
         self.outcomes: Counter[str] = Counter()
-        """Outcome → number of the stage that ran last."""
+        """Outcome → number of runs, of the last call."""
 
     def run(self, stage: str, settings: Sequence[Setting]) -> list[list[Run]]:
         """See :class:`doe.run_records.Runner`."""
@@ -91,7 +91,7 @@ class CountingRunner:
 
 
 class PartialStages:
-    """Follows a campaign: after a run, the result of its stage so far, as soon as one can be computed."""
+    """Follows a campaign and reports, as runs end, the result of the stage so far, once one can be computed."""
 
     def __init__(self, on_partial: OnPartial, clock: Callable[[], float] = time.perf_counter) -> None:
         self._on_partial, self._clock = on_partial, clock
@@ -110,7 +110,7 @@ class PartialStages:
             return
         self._runs.append(run)
         began = self._clock()
-        # Runs from the store come all at once; the next one that is really made finds them all.
+        # Runs from the store arrive all at once; they are analysed when the next run is really made.
         if run.reused or began < self._due:
             return
         try:
@@ -124,11 +124,11 @@ class PartialStages:
 
 
 class KnownRuns:
-    """A runner that makes no run: it answers with those that have ended."""
+    """A runner that makes no runs: it returns those that have already ended."""
 
     def __init__(self, runs: Sequence[Run]) -> None:
         self._runs = sorted(runs, key=lambda run: (run.replicate, run.attempt))
 
     def run(self, stage: str, settings: Sequence[Setting]) -> list[list[Run]]:
-        """See :class:`doe.run_records.Runner`; the runs of a setting are those with its label."""
+        """See :class:`doe.run_records.Runner`; the runs of a setting are found by its label."""
         return [[run for run in self._runs if run.label == setting.label] for setting in settings]

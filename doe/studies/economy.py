@@ -1,11 +1,11 @@
-"""Whether cheaper settings of the numerical method give the same piles: equivalence tests against the full settings.
+"""Equivalence tests of cheaper numerical settings (economies) against the full settings: are the piles the same?
 
 Every economy is tested at the centre of a study and at the two corners of its ranges with the largest overlaps: the
-softest materials with the highest restitution, at the lowest and at the highest friction. At each, so many pours are
-made with and without the economy, all with seeds of their own (a pour is chaotic: the same seed would not make two of
-them alike). An observable is equivalent where both one-sided tests (TOST; Schuirmann 1987) keep its mean within
-``MARGIN`` standard deviations of one pour. The economy is accepted where all observables are, at all three settings,
-and where the share of valid pours has not changed.
+softest materials with the highest restitution, at the lowest and at the highest friction. At each of these, the same
+number of pours is made with and without the economy, all with different seeds (a pour is chaotic: with the same seed
+the two would be no more alike). An observable is equivalent if the two one-sided tests (TOST; Schuirmann 1987) place
+the difference of its means within ``MARGIN`` standard deviations of one pour. The economy is accepted if all
+observables are equivalent at all three settings and the share of valid pours does not differ significantly.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from doe.studies.study import Study
 from solver import Scene, observable_names, parameters, value, with_values
 
 MARGIN = 0.3
-"""Of a mean, in standard deviations of one pour with the full settings."""
+"""Margin of a mean, in standard deviations of one pour with the full settings."""
 ALPHA, POWER = 0.05, 0.9
 COMPARED = (
     "angle_of_repose_deg",
@@ -35,22 +35,22 @@ COMPARED = (
     "bulk_density_kg_m3",
     "discharge_time_s",
 )
-"""What has to stay: the slope read off the silhouette and off the surface, height, spread, packing and flow."""
+"""Observables that must not change: slope from the silhouette and from the surface, height, spread, packing, flow."""
 SHARE_ALPHA = 0.01
 """Level at which the shares of valid pours count as different (Fisher's exact test)."""
 
 
 @dataclass(frozen=True)
 class Economy:
-    """A way to pour at less cost: what it multiplies in a scene."""
+    """A cheaper way to pour: the parameters of a scene that it multiplies."""
 
     name: str
     factors: Mapping[str, float]
-    """Last parts of parameter paths, or whole ones → factor on the value that the scene has."""
+    """Last part of a parameter path, or a whole path → factor by which the scene's value is multiplied."""
     reason: str
 
     def values(self, scene: Scene) -> dict[str, float]:
-        """The parameters of ``scene`` that it changes, with their new values in SI."""
+        """Return the parameters of ``scene`` that it changes, with their new values in SI."""
         return {
             path: value(scene, path) * factor
             for ending, factor in self.factors.items()
@@ -75,40 +75,40 @@ ECONOMIES: Mapping[str, Economy] = {
 
 @dataclass(frozen=True)
 class ComparedMeans(Record):
-    """One observable at one setting, with the economy and without."""
+    """One observable at one setting, with and without the economy."""
 
     setting: str
     observable: str
     full: Sample
     economical: Sample
     margin: float
-    """In the observable's unit."""
+    """Margin in the observable's unit."""
     low: float
     high: float
-    """Interval of the difference of the means (economical less full) at the level 1 − 2 α."""
+    """Interval of the difference of the means (economical minus full) at the confidence level 1 − 2 α."""
     p: float
     equivalent: bool
 
 
 @dataclass(frozen=True)
 class Shares(Record):
-    """Valid pours at one setting."""
+    """Shares of valid pours at one setting."""
 
     setting: str
     full: tuple[int, int]
-    """Valid pours, pours."""
+    """Valid pours, all pours."""
     economical: tuple[int, int]
     p: float
-    """Of Fisher's exact test."""
+    """p of Fisher's exact test."""
 
 
 @dataclass(frozen=True)
 class EconomyTest(Record):
-    """What came out for one economy."""
+    """Result of the test of one economy."""
 
     economy: str
     pours: int
-    """Of each kind at each setting."""
+    """Number of pours of each kind at each setting."""
     compared: tuple[ComparedMeans, ...]
     shares: tuple[Shares, ...]
     cost: float
@@ -117,7 +117,7 @@ class EconomyTest(Record):
 
 
 def pours_needed(margin: float = MARGIN, alpha: float = ALPHA, power: float = POWER) -> int:
-    """Pours of each kind for ``power`` where the means are equal: n = 2 (z₁₋α + z₍₁₊power₎/₂)² / margin².
+    """Return the pours of each kind needed for ``power`` with equal means: n = 2 (z₁₋α + z₍₁₊power₎/₂)² / margin².
 
     ``margin`` is in standard deviations of one pour. Source: Julious 2004, Stat. Med. 23:1921, eq. 23.
     """
@@ -126,7 +126,7 @@ def pours_needed(margin: float = MARGIN, alpha: float = ALPHA, power: float = PO
 
 
 def settings_of(study: Study) -> dict[str, dict[str, float | str]]:
-    """Centre and the two corners of ``study``: name → what is changed against its scene."""
+    """Return the centre and the two corners of ``study``: name → values that differ from its scene."""
     corners: dict[str, dict[str, float | str]] = {"centre": {}, "soft, least friction": {}, "soft, most friction": {}}
     ends = {"shear_modulus": ("low", "low"), "restitution": ("high", "high"), "static_friction": ("low", "high")}
     for factor in study.factors:
@@ -138,10 +138,10 @@ def settings_of(study: Study) -> dict[str, dict[str, float | str]]:
 
 
 def rows_of(study: Study, economy: Economy, pours: int) -> list[Setting]:
-    """Each setting without and with ``economy``, in turns."""
+    """Return each setting without and then with ``economy``."""
     rows = []
     for name, values in settings_of(study).items():
-        # A corner may set what the economy scales.
+        # A corner may set a parameter that the economy scales.
         cheap = economy.values(with_values(study.scene, values))
         rows += [Setting(name, values, pours), Setting(f"{name}, {economy.name}", {**values, **cheap}, pours)]
     return rows
@@ -150,7 +150,7 @@ def rows_of(study: Study, economy: Economy, pours: int) -> list[Setting]:
 def compare(
     study: Study, economy: Economy, runner: Runner, pours: int, told: Callable[[EconomyTest], None] | None = None
 ) -> EconomyTest:
-    """Pour and compare; ``told`` is called with what is known after every tenth of the pours."""
+    """Pour and compare; ``told`` is called with the result so far after every tenth of the pours."""
     stage = f"economy {economy.name}"
     found = None
     for count in sorted({max(2, round(pours * part / 10)) for part in range(1, 11)}):
@@ -163,7 +163,7 @@ def compare(
 
 
 def judged(study: Study, economy: Economy, rows: Sequence[Sequence[Run]], pours: int) -> EconomyTest:
-    """The comparison of what has been poured; ``rows`` as :func:`rows_of` has them."""
+    """Return the comparison of the pours made; ``rows`` in the order of :func:`rows_of`."""
     names = list(settings_of(study))
     asked = [one for one in COMPARED if one in observable_names(study.scene)]
     compared: list[ComparedMeans] = []
@@ -187,7 +187,7 @@ def _observables(
         one, two = (_values(runs, observable) for runs in (full, cheap))
         base, other = (Sample.of(x) if len(x) else Sample(math.nan, math.nan, 0) for x in (one, two))
         margin = MARGIN * base.sd
-        # What cannot be tested (hardly a valid pour, or no scatter) is not shown to be alike.
+        # What cannot be tested (hardly a valid pour, or no scatter) is not shown to be equivalent.
         if min(base.n, other.n) < 2 or not margin > 0.0:
             yield ComparedMeans(name, observable, base, other, margin, math.nan, math.nan, math.nan, False)
         else:

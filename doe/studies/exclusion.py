@@ -1,7 +1,7 @@
-"""Runs of a finished study that somebody leaves out, each for a reason, and the optimum of the runs that are left.
+"""Runs of a finished study that a user excludes, each for a stated reason, and the optimum of the remaining runs.
 
-The response surface is fitted anew to what is left of its runs; which factors it has and where it stands was decided
-by runs of other stages, and stays. The verification was made at the optimum of all runs.
+The response surface is refitted to its remaining runs; its factors and region were decided by runs of other stages and
+stay as they are. The verification was made at the optimum of all runs.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from doe.stages.surface import OptimumResult, optimum_of
 from doe.studies.study_result import StudyResult
 
 USUAL_SEED = 1
-"""Of a study whose file names none; results of older versions do not say."""
+"""Seed of a study whose file names none; results of older versions do not record it."""
 
 
 @dataclass(frozen=True)
 class ExcludedRun:
-    """One run of the response surface that is left out: its setting, its experiment ("": the study's own), its seed."""
+    """One excluded run of the response surface: its setting, experiment ("": the study's own rig), seed and reason."""
 
     label: str
     experiment: str
@@ -30,14 +30,14 @@ class ExcludedRun:
     reason: str
 
     def is_of(self, run: Run) -> bool:
-        """Whether it is this run."""
+        """Return whether ``run`` is the excluded one."""
         return (self.label, self.experiment, self.seed) == (run.label, run.experiment, run.seed)
 
 
 def optimum_without(result: StudyResult, excluded: Sequence[ExcludedRun]) -> OptimumResult:
-    """The optimum by the runs of the surface that are not ``excluded``.
+    """Return the optimum by the runs of the surface that are not ``excluded``.
 
-    Raises StatisticsError where too few runs are left for the model.
+    Raises StatisticsError if too few runs are left for the model.
     """
     surface, seed = result.surface, result.study.seed
     rows = [[run for run in runs if not any(one.is_of(run) for one in excluded)] for runs in surface.runs]

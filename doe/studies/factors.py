@@ -1,4 +1,4 @@
-"""What a factor means for a scene: levels within the declared ranges, and how many bodies it touches."""
+"""Factors in a scene: their levels within the declared ranges, and the number of bodies that they affect."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from solver import ParameterError, Scene, body_counts, canonical, parameters, value, with_values
 
 MIN_BODIES = 5
-"""A factor that touches fewer bodies than this cannot be tested: its effect is that of a handful of places."""
+"""A factor that affects fewer bodies than this cannot be tested: its effect depends on where a few bodies lie."""
 
 
 def checked_levels(
     scene: Scene, name: str, path: str, levels: Sequence[float | str]
 ) -> tuple[str, float | str, float | str, float | str]:
-    """(canonical path, low, high, reference [SI]) of the factor ``name``; each level is tried on the scene."""
+    """Return (canonical path, low, high, reference [SI]) of the factor ``name``; its ends are tried on the scene."""
     path = canonical(scene, path)
     parameter = parameters(scene)[path]
     low, high, reference = (parameter.check(level) for level in levels)
@@ -31,11 +31,11 @@ def checked_levels(
 
 
 def bodies_touched(scene: Scene, path: str) -> float:
-    """Number of bodies whose contacts a parameter rules; infinite for the rig, the insertion and the numerics.
+    """Return the number of bodies whose contacts a parameter affects; infinite for rig, insertion and numerics.
 
-    For a pair it is the smaller number of the two partners (the wall counts as infinitely many). A dimension of a
-    body touches the bodies of that component; the resolution of the shapes and a mass fraction, which moves all the
-    others, touch every body.
+    For a pair it is the smaller number of the two partners (the wall counts as infinitely many). A dimension of a body
+    affects the bodies of that component. The resolution of the shapes affects every body, and so does a mass fraction,
+    because it changes all the others.
     """
     number = list(zip(scene.bodies, body_counts(scene), strict=True))
 
@@ -55,5 +55,5 @@ def bodies_touched(scene: Scene, path: str) -> float:
 
 
 def is_off(scene: Scene, path: str) -> bool:
-    """Whether the scene has the parameter and it is 0, as those of an effect that is off."""
+    """Return whether the scene has the parameter and it is 0, like the parameters of an effect that is off."""
     return path in parameters(scene) and value(scene, path) == 0.0

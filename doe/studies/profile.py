@@ -1,4 +1,4 @@
-"""How much is spent on a study: shapes, mass and the numbers of runs."""
+"""Effort spent on a study: shapes, mass and numbers of runs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from doe.record import Record
 from solver import TABLE, Number, Quantity, Whole
 
 NAME = re.compile(r"[^/\\\x00-\x1f]{1,60}")
-"""What a profile may be called: the page names folders of results after it."""
+"""Allowed names of a profile: the page names folders of results after it."""
 
 
 @dataclass(frozen=True)

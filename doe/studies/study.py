@@ -1,7 +1,7 @@
-"""A study: what is varied, against which measurement, with how many runs. Read from a TOML file (:class:`StudyFile`).
+"""A study: its factors, measured targets and numbers of runs, read from a TOML file (:class:`StudyFile`).
 
-The designs of the stages are Plackett–Burman of 28 and of 12 runs and Box–Behnken, unless
-``[screening]``, ``[assumptions]`` or ``[surface]`` names another one of ``doe/designs``.
+The designs of screening, assumptions and surface are Plackett–Burman of 28 runs, Plackett–Burman of 12 runs and
+Box–Behnken, unless ``[screening]``, ``[assumptions]`` or ``[surface]`` names another design of ``doe/designs``.
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ from solver import (
 )  # fmt: skip
 
 DUMMIES = 3
-"""Columns of a table for main effects alone that stay free of factors, where the file says nothing."""
+"""Number of columns without a factor in a design for main effects alone, unless the file states another."""
 
 IN_STUDIES = DesignOptions(alpha="face-centred")
-"""Options where a study says nothing: the axial points stay in the region that is searched."""
+"""Default options in a study: axial points stay within the searched region."""
 
 SCREENING = ChosenDesign(PlackettBurman(), replace(IN_STUDIES, runs=28))
 
@@ -68,10 +68,10 @@ SURFACE = ChosenDesign(BoxBehnken(), IN_STUDIES)
 def main_effect_design(
     table: DesignTable, key: str, whose: str, usual: ChosenDesign, factors: Sequence[Factor], dummies: int | None
 ) -> ChosenDesign:
-    """The design of a stage that looks at main effects, read from its table and checked with its factors.
+    """Return the design of a stage that estimates main effects, read from its table and checked with its factors.
 
-    ``whose``: key of the factors in the file. ``dummies``: columns that have to stay free in a design that is made for
-    main effects alone; None: three. Raises StudyFileError.
+    ``whose``: key of the factors in the file. ``dummies``: number of columns that must stay free in a design for main
+    effects alone; None: three. Raises StudyFileError.
     """
     chosen = _chosen(table, key, usual)
     if not factors:
@@ -99,7 +99,7 @@ def main_effect_design(
 
 
 def second_order_design(table: DesignTable, key: str, usual: ChosenDesign, factors: int) -> ChosenDesign:
-    """The design of a stage that fits a full second-order model; raises StudyFileError where it cannot."""
+    """Return the design of a stage that fits a full second-order model; raises StudyFileError if it cannot do so."""
     chosen = _chosen(table, key, usual)
     name = chosen.design.name
     try:
@@ -127,7 +127,7 @@ def _chosen(table: DesignTable, key: str, usual: ChosenDesign) -> ChosenDesign:
 
 
 def _require_inside(points: Points, key: str, name: str) -> None:
-    """Beyond low … high a parameter may be out of its range, or a factor mean nothing."""
+    """Refuse points beyond low … high, where a parameter may leave its range or a factor become meaningless."""
     furthest = float(np.abs(points.coded).max())
     if furthest > 1.0 + 1e-9:
         raise StudyFileError(
@@ -137,13 +137,13 @@ def _require_inside(points: Points, key: str, name: str) -> None:
 
 
 CALIBRATED = 3
-"""Factors that go on from the screening to the ascent and the response surface."""
+"""Number of factors that pass from the screening to the ascent and the response surface."""
 
 TRIES = 3
-"""Seeds that are tried for one replicate; a run that jammed or broke is kept with its outcome and replaced."""
+"""Number of seeds tried for one replicate; a run that jammed or broke is kept with its outcome and replaced."""
 
 EXPERIMENT = re.compile(r"[\w-]{1,60}")
-"""What an experiment may be called: its name stands before those of its observables."""
+"""Allowed names of an experiment: the name precedes those of its observables."""
 
 Values = dict[str, float | str]
 
@@ -159,7 +159,7 @@ class Factor(Record):
     reference: float | str
 
     def level(self, coded: float) -> float | str:
-        """Value at a coded level: −1 low, +1 high, linear between; a named level only at the ends."""
+        """Return the value at a coded level: −1 low, +1 high, linear between; a named level exists only at the ends."""
         if isinstance(self.low, str) or isinstance(self.high, str):
             return self.high if coded > 0 else self.low
         return self.low + 0.5 * (coded + 1.0) * (self.high - self.low)
@@ -192,11 +192,11 @@ class Study:
 
     @property
     def all_experiments(self) -> tuple[str, ...]:
-        """Names of all experiments, "" for the study's own rig first."""
+        """Names of all experiments; the first, "", is the study's own rig."""
         return ("", *self.experiments)
 
     def scene_of(self, experiment: str) -> Scene:
-        """The scene of an experiment by its name, "" for the study's own rig."""
+        """Return the scene of an experiment by its name, "" for the study's own rig."""
         return self.experiments[experiment] if experiment else self.scene
 
 
@@ -287,17 +287,18 @@ class StudyFile(TomlTable):
 
 
 def load_study(name: str) -> Study:
-    """Study from a shipped name or a file; every mistake is one line that names file, key and what is allowed."""
+    """Load a study by a shipped name or from a file; a mistake is one line naming file, key and what is allowed."""
     path = asset_path("studies", name)
     with naming_file(path, ParameterError, StudyFileError):
         return study_from(read_toml(path), path)
 
 
 def with_profile(study: Study, name: str) -> tuple[Study, Profile]:
-    """The study with the shapes and the mass of profile ``name``, and the profile.
+    """Return the study with the shapes and the mass of profile ``name``, and that profile.
 
-    Raises ParameterError where there is no such profile, its mixture leaves too few factors of the fallback list
-    testable, or it asks for a resolution in degrees of a target that is no angle.
+    Raises ParameterError if there is no such profile, its mixture leaves too few factors of the fallback list testable,
+    it states a resolution in degrees for a target that is not an angle, or its response surface has no degrees of
+    freedom for the error.
     """
     if name not in study.profiles:
         raise ParameterError(f"{study.file}: profile: {name!r} is not one of {', '.join(study.profiles)}")
@@ -327,7 +328,7 @@ def with_profile(study: Study, name: str) -> tuple[Study, Profile]:
 
 
 def _refuse_without_error(study: Study, profile: Profile) -> None:
-    """A response surface needs a run more than it has terms; better said now than after all other stages."""
+    """A response surface needs at least one run more than terms; checked now rather than after all other stages."""
     rows, terms = (
         len(study.surface_design.points(CALIBRATED).coded),
         len(term_names([str(k) for k in range(CALIBRATED)])),
@@ -340,7 +341,7 @@ def _refuse_without_error(study: Study, profile: Profile) -> None:
 
 
 def study_from(table: Settings, path: Path) -> Study:
-    """Study from a parsed file. Raises ParameterError or StudyFileError."""
+    """Return the study of a parsed file. Raises ParameterError or StudyFileError."""
     if is_material(table):
         raise StudyFileError(
             f'{path} is a material, not a study; a study names it (material = "{path.name}"), and '
@@ -407,7 +408,7 @@ def study_from(table: Settings, path: Path) -> Study:
 
 
 def _require_possible(target: Target) -> None:
-    """Refuse a mean that no measurement can give; one of a model (``before_mean``) may be any."""
+    """Refuse a mean that no measurement can give; that of a model (``before_mean``) may have any value."""
     known = OBSERVABLES[target.observable.rpartition("/")[2]]
     if not known.is_possible(target.mean):
         low, high = known.possible
@@ -417,7 +418,7 @@ def _require_possible(target: Target) -> None:
 
 
 def _experiments(material: Scene, table: Settings, path: Path, factors: Sequence[Factor]) -> dict[str, Scene]:
-    """The scene of each experiment: the study's material, contact and effects in a rig and with a mass of its own."""
+    """The scene of each experiment: the study's material, contact and effects, in its own rig with its own mass."""
     found: dict[str, Scene] = {}
     shared = {key: table[key] for key in ("contact", "effect") if key in table}
     for entry in table.get("experiment", ()):
@@ -441,7 +442,7 @@ def _experiments(material: Scene, table: Settings, path: Path, factors: Sequence
 
 
 def _further(tables: dict[str, Settings]) -> dict[str, Settings]:
-    """Tables of stages of other packages; what is in one is for its stage to check."""
+    """Tables of stages of other packages; the stage itself checks the contents."""
     known = plugged_in("stage")
     for name in tables:
         if name not in known:
@@ -455,7 +456,7 @@ def _levels(scene: Scene, entry: LevelsTable) -> Factor:
 
 
 def _factor(scene: Scene, entry: LevelsTable) -> Factor:
-    """A factor; it may have to be varied continuously, which named levels cannot."""
+    """A factor. It may have to be varied continuously, which is impossible with named levels."""
     factor = _levels(scene, entry)
     if isinstance(factor.low, str):
         raise StudyFileError(

@@ -1,4 +1,4 @@
-"""What a study found, stage by stage: the content of ``result.json``, and of ``partial.json`` while it still runs."""
+"""Findings of a study, stage by stage: the content of ``result.json``, and of ``partial.json`` while it still runs."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ StageResult = (
     | FurtherResult
 )
 USUAL_DESIGNS = {"screening": "Plackett–Burman", "assumptions": "Plackett–Burman", "surface": "Box–Behnken"}
-"""Stage → title of its design, where a result says none: those of versions in which there was no choice."""
+"""Stage → title of its design where a result does not state it: older versions offered no choice."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StudyDescription(Record):
-    """What was asked.
+    """Description of a study: its targets, factors and settings.
 
-    ``contact``: the contact law and its conventions; ``tries``: seeds for one replicate; ``designs``: stage → title of
-    its design.
+    ``contact``: the contact law and its conventions; ``tries``: number of seeds tried for one replicate; ``designs``:
+    stage → title of its design.
     """
 
     name: str
@@ -86,7 +86,7 @@ class StudyDescription(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class Stages(Record):
-    """The result of every stage, in running order; None of one that has not ended, or that the study does not have."""
+    """Results of all stages, in running order; None for a stage that has not ended or that the study does not have."""
 
     pilot: PilotResult | None = None
     reach: ReachResult | None = None
@@ -98,7 +98,7 @@ class Stages(Record):
     optimum: OptimumResult | None = None
     verification: VerificationResult | None = None
     further: dict[str, FurtherResult] = field(default_factory=dict)
-    """Those of other packages, by name."""
+    """Results of the stages of other packages, by name."""
 
     def result_of(self, stage: str) -> StageResult | None:
         """Return the result of a stage by its name."""
@@ -106,7 +106,7 @@ class Stages(Record):
         return found
 
     def with_result(self, stage: str, result: StageResult | None) -> Self:
-        """Return these results with that of one more stage."""
+        """Return these results together with that of one more stage."""
         if isinstance(result, FurtherResult):
             return replace(self, further=self.further | {stage: result})
         changes: dict[str, Any] = {stage: result} if stage in OWN_STAGES else {}
@@ -117,7 +117,7 @@ class Stages(Record):
         return (*OWN_STAGES, *self.further)
 
     def runs_of(self, stage: str) -> tuple[tuple[Run, ...], ...]:
-        """Return the runs of each setting of a stage, failed ones included; empty where it made none."""
+        """Return the runs of each setting of a stage, failed ones included; empty if it made none."""
         found = self.result_of(stage)
         if found is None or isinstance(found, OptimumResult):
             return ()
@@ -132,12 +132,12 @@ class Stages(Record):
         return tuple(run for run in self.own_runs_of("pilot") if run.label == REFERENCE)
 
     def settings_of(self, stage: str) -> tuple[Setting, ...]:
-        """Return the settings of a stage, in the order of ``runs_of``; empty also of results of older versions."""
+        """Return the settings of a stage, in the order of ``runs_of``; also empty for results of older versions."""
         found = self.result_of(stage)
         return () if found is None or isinstance(found, OptimumResult) else found.settings
 
     def all_runs(self) -> Iterator[tuple[str, Run]]:
-        """Return (stage, run) of every run, failed ones included."""
+        """Return (stage, run) for every run, failed ones included."""
         return ((stage, run) for stage in self.stage_names() for runs in self.runs_of(stage) for run in runs)
 
 
@@ -147,7 +147,7 @@ OWN_STAGES = tuple(one.name for one in fields(Stages) if one.name != "further")
 
 @dataclass(frozen=True, kw_only=True)
 class AllStages(Stages):
-    """The same of a study that has ended."""
+    """Results of all stages of a finished study."""
 
     pilot: PilotResult
     screening: ScreeningResult
@@ -159,7 +159,7 @@ class AllStages(Stages):
 
 @dataclass(frozen=True, kw_only=True)
 class Described(Document):
-    """A file of results that says what was asked."""
+    """A file of results together with the description of its study."""
 
     SCHEMA: ClassVar[int] = 1
     NAME: ClassVar[str] = "result of a study"
@@ -169,7 +169,7 @@ class Described(Document):
 
 @dataclass(frozen=True, kw_only=True)
 class PartialStudy(Stages, Described):
-    """What a study that runs has found so far: ``partial`` is the stage that runs, ``line`` its analysis in words."""
+    """Results so far of a running study: ``partial`` is the stage that is running, ``line`` its analysis in words."""
 
     partial: str | None = None
     line: str = ""
@@ -177,7 +177,7 @@ class PartialStudy(Stages, Described):
 
 @dataclass(frozen=True)
 class ListedRun(Record):
-    """One run of a study, as all of them are listed."""
+    """One run in the list of all runs of a study."""
 
     stage: str
     label: str
@@ -188,7 +188,7 @@ class ListedRun(Record):
 
 @dataclass(frozen=True)
 class RunCounts(Record):
-    """Number of runs, in all and by outcome and stage, and all of them by name."""
+    """Number of runs, in total, by outcome and by stage, and the list of all runs."""
 
     total: int
     valid: int
@@ -218,7 +218,7 @@ class RunCounts(Record):
 
 @dataclass(frozen=True)
 class Timing(Record):
-    """Seconds in all and by stage; ``reused_runs`` were found in the store."""
+    """Time [s] in total and by stage; ``reused_runs``: number of runs found in the store."""
 
     total_s: float
     stage_s: dict[str, float]
@@ -228,7 +228,7 @@ class Timing(Record):
 
 @dataclass(frozen=True)
 class PouredBody(Record):
-    """A body of the mixture: its mass [kg], and how well its member spheres stand for its solid."""
+    """A body of the mixture: its mass [kg], and how well its member spheres represent its solid."""
 
     body: str
     mass: float
@@ -246,20 +246,20 @@ class StudyResult(AllStages, Described):
     shapes: tuple[PouredBody, ...]
     about: About = field(default_factory=About)
     set_up: SetUp | None = None
-    """None in results of before there was one."""
+    """None in results of older versions."""
     experiments: dict[str, SetUp] = field(default_factory=dict)
     """Name → set-up of each further experiment."""
     piles: tuple[PouredPile, ...] = ()
-    """At the reference setting and at the optimum; none of a rig without a free pile."""
+    """Piles at the reference setting and at the optimum; empty for a rig without a free pile."""
 
 
 AnyStudy = PartialStudy | StudyResult
 
 
 def study_from(content: Mapping[str, Any]) -> AnyStudy:
-    """Return the result that a file holds, of a finished study or of one that runs.
+    """Return the result in a file, of a finished study or of a running one.
 
-    Raises VersionError for that of another version, RecordError for anything else.
+    Raises VersionError for a result of another version, RecordError for anything else that is not a result.
     """
     return StudyResult.from_dict(content) if "runs" in content else PartialStudy.from_dict(content)
 
