@@ -1,8 +1,8 @@
 """The whole analysis of a design that was run in any laboratory or engine, from its runs to the settings for a target.
 
-Two-level designs are screened (effects, Lenth, error by replicates or by columns that carry no factor); every design
-whose runs can bear it gets a polynomial model with its analysis of variance, diagnostics and the path of steepest
-ascent; a full second-order model its canonical analysis as well.
+Two-level designs are screened (effects, Lenth, error by replicates or by columns that carry no factor). Every design
+whose runs support it gets a polynomial model with its analysis of variance, diagnostics and the path of steepest
+ascent, and a full second-order model also its canonical analysis.
 """
 
 from __future__ import annotations
@@ -80,8 +80,8 @@ class Effects(Record):
 
 @dataclass(frozen=True)
 class TargetIntervals(Record):
-    """Half widths about the model at the setting for a target, unit of the response: of one further run (95 %), and of
-    95 % of all further runs with a confidence of 95 %.
+    """Half widths of intervals about the model at the setting for a target, unit of the response: for one further run
+    (95 %), and for 95 % of all further runs with a confidence of 95 %.
     """
 
     one_run: float
@@ -90,11 +90,11 @@ class TargetIntervals(Record):
 
 @dataclass(frozen=True)
 class DesignAnalysis(Record):
-    """What the runs of a design say. effects: None unless every level is low, high or (all factors) middle. model: None
-    where the runs leave no error for any model. notes: sentences that a reader must know. at_target: None without an
-    optimum. reduced: None without a search for terms to drop. Instead of all others: mixture of parts that add up to a
-    whole, named of factors that are names, random with groups drawn at random, elementary of a Morris
-    design. surrogate: beside the model, with its own setting for the target; None unless asked for.
+    """Results of the runs of a design. effects: None unless every level is low, high or (all factors) middle. model:
+    None where the runs leave no error for any model. notes: sentences that a reader must know. at_target: None without
+    an optimum. reduced: None without a search for terms to drop. In place of all these: mixture, if the factors are
+    parts of a whole; named, if factors are names; random, if groups are drawn at random; elementary, for a Morris
+    design. surrogate: in addition to the model, with its own setting for the target; None unless asked for.
     """
 
     fits: tuple[OrderFit, ...]
@@ -112,7 +112,7 @@ class DesignAnalysis(Record):
     surrogate_target: ProcessTarget | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """Return every field; those that not every analysis has only where it has them."""
+        """Return every field; fields that only some analyses have are left out where they are None."""
         optional = ("mixture", "at_target", "reduced", "named", "random", "elementary", "surrogate", "surrogate_target")
         own = {name for name in optional if getattr(self, name) is None}
         return {name: value for name, value in super().to_dict().items() if name not in own}
@@ -131,11 +131,11 @@ def analyse_design(
     """Analyse one response.
 
     coded: settings, shape (rows, k), low = -1, high = +1. responses: (rows, replicates), NaN where a run is missing.
-    order: "linear", "interactions" or "quadratic"; None for the highest that the runs bear with 3 degrees of freedom
-    for the error. terms: instead of an order, the terms of the model; what they stand on is added. blocks: in which the
-    runs were made; they have fixed effects in the model, and the effects of a two-level design are told by that alone.
-    reduction: rule by which terms are dropped from this model.
-    Raises StatisticsError where nothing can be estimated, or an order or term is asked for that the runs cannot bear.
+    order: "linear", "interactions" or "quadratic"; None for the highest that the runs support with 3 degrees of freedom
+    for the error. terms: the terms of the model instead of an order; the linear terms that they need are added. blocks:
+    those in which the runs were made; they have fixed effects in the model, and the effects of a two-level design are
+    then given by the model alone. reduction: rule by which terms are dropped from this model.
+    Raises StatisticsError where nothing can be estimated, or the runs do not support the order or terms asked for.
     """
     notes: list[str] = []
     effects = None if blocks is not None else _effects(coded, responses, region.names, notes)
@@ -175,7 +175,7 @@ def analyse_design(
 
 
 def reduction_words(found: ReducedModel) -> str:
-    """Return a sentence: what was dropped, and what that does to the tests of what is left."""
+    """Return a sentence on which terms were dropped, and on how this affects the tests of the remaining terms."""
     rule = "AICc" if found.rule == "aicc" else f"p > {STAYS:g}"
     if not found.dropped:
         return f"Reduction by {rule} drops no term."
@@ -194,7 +194,7 @@ def _terms(
     saturated_is_fine: bool,
     blocks: Blocks | None,
 ) -> tuple[str, ...] | None:
-    """Return the terms of the model; None where the runs bear none and their effects are known without."""
+    """Return the terms of the model; None where the runs support no model and effects are estimated without one."""
     if terms:
         return hierarchical(names, terms)
     if order is not None:
@@ -244,7 +244,7 @@ def _effects(coded: FloatArray, responses: FloatArray, names: Sequence[str], not
     regular = is_regular(levels)
     contrasts = regular_contrasts(levels, names) if regular else screening_contrasts(levels, names)
     if np.isnan(values).all(axis=1).any() or len(contrasts.names) < len(names):
-        # A lost row ends orthogonality: only what is fitted by least squares can still be told apart.
+        # A lost row destroys orthogonality: only the effects fitted by least squares can still be separated.
         contrasts = Contrasts(levels, tuple(names), (), {})
         notes.append("Rows without a valid run: interactions and unused columns are left out of the effects.")
     screening = analyse_screening(contrasts.levels, contrasts.names, values, contrasts.dummies)

@@ -1,4 +1,4 @@
-"""Where a second-order surface is stationary, how it curves there, and where it is best within a distance.
+"""Where a second-order surface is stationary, how it curves there, and where it is highest and lowest within a radius.
 
 Canonical analysis: the stationary point, and the curvatures along the principal axes.
 Source: Box and Wilson 1951; Myers, Montgomery and Anderson-Cook 2016, Response Surface Methodology, ch. 6.
@@ -106,8 +106,8 @@ def ridge_analysis(surface: Surface, furthest: float | None = None) -> tuple[Rid
 def highest_on_sphere(b: FloatArray, matrix: FloatArray, radius: float) -> FloatArray:
     """Return the x of |x| = radius with the largest b'x + x'Bx, shape (k,).
 
-    In the axes of B, x_i = c_i/(2 (mu - l_i)). Where b has no part along the steepest axis and the others fall short of
-    the radius, mu is the largest eigenvalue and the rest of the radius goes along that axis (either way is as good).
+    In the axes of B, x_i = c_i/(2 (mu - l_i)). If b has no component along the steepest axis and the other components
+    fall short of the radius, mu is the largest eigenvalue and the remainder lies along that axis (either sign will do).
     """
     if radius == 0:
         return np.zeros(b.size)

@@ -1,8 +1,9 @@
-"""All contrasts of a two-level design: main effects, interactions, and what is confused with what.
+"""All contrasts of a two-level design: main effects, interactions, and their aliases.
 
-In a regular design every product of factor columns is either a column of its own or equal to an earlier one up to its
-sign; each such column is one contrast, named by its simplest effect. Interactions of three and more are held to be
-noise and serve as error (Montgomery 2017, ch. 6). In a Plackett–Burman design the unused columns of its table do.
+In a regular design every product of factor columns is either a new column or equal to an earlier one up to its sign;
+each distinct column is one contrast, named after its simplest effect. Interactions of three or more factors are assumed
+to be noise and serve as error (Montgomery 2017, ch. 6). In a Plackett–Burman design the unused columns of its table
+serve as error.
 """
 
 from __future__ import annotations
@@ -23,15 +24,15 @@ from doe.record import Record
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 MOST_FACTORS = 10
-"""Of a regular design whose products are all formed."""
+"""Largest number of factors of a regular design for which all products are formed."""
 
 
 @dataclass(frozen=True)
 class Contrasts(Record):
     """Columns to estimate: levels (rows, columns) of -1/+1 with names; dummies are those that serve as error.
 
-    aliases: column → other effects of up to two factors on the same column, with their sign, and the part of them that
-    it carries where that is not all.
+    aliases: column → other effects of up to two factors on the same column, with their sign and, for partial aliases,
+    the share of them that the column carries.
     """
 
     levels: IntArray
@@ -44,7 +45,7 @@ class Contrasts(Record):
 class Curvature(Record):
     """Centre runs against the corners. difference = mean(corners) - mean(centre), unit of the response.
 
-    SS = nF nC difference^2/(nF + nC), 1 degree of freedom, against the spread of the centre runs and of replicates.
+    SS = nF nC difference^2/(nF + nC), 1 degree of freedom, tested against the spread of centre runs and of replicates.
     """
 
     difference: float
@@ -110,7 +111,7 @@ def screening_contrasts(levels: IntArray, names: Sequence[str]) -> Contrasts:
 
 
 def curvature(levels: FloatArray, responses: FloatArray) -> Curvature | None:
-    """Return the test of the centre runs (all levels 0) against the corners; None without both, or without an error.
+    """Return the test of the centre runs (all levels 0) against the corners; None without both or without an error.
 
     levels: (rows, factors) of -1, 0, +1; responses: (rows, replicates), NaN where missing.
     """

@@ -1,12 +1,12 @@
-"""Elementary effects of a Morris design: which of many factors act, and which of them bend or act with others?
+"""Elementary effects of a Morris design: which of many factors act, and which are nonlinear or interact with others?
 
-Two runs of a trajectory, one after the other, that differ in one factor alone by d of its range give its elementary
-effect e = (change of the response)/d, the response's change from low to high if it went on like that. A trajectory ends
-where none or several factors change, or one that has changed in it before. Over the trajectories:
-mu their mean, mu* the mean of |e| (a factor that acts up here and down there has mu near 0, but not mu*), sigma their
-standard deviation, which is 0 of a factor that acts linearly and alone (and has the noise of the runs in it). Source:
-Morris 1991, Technometrics 33:161, doi 10.1080/00401706.1991.10484804; Campolongo, Cariboni and Saltelli 2007, Environ.
-Model. Softw. 22:1509, doi 10.1016/j.envsoft.2006.10.004.
+Two consecutive runs of a trajectory that differ in one factor only, by the fraction d of its range, give its elementary
+effect e = (change of the response)/d: the change of the response from low to high, extrapolated linearly. A trajectory
+ends where no factor or several factors change, or one that has already changed in it. Over all trajectories, mu is the
+mean of e, mu* the mean of |e| (if a factor raises the response in places and lowers it in others, mu is near 0, but not
+mu*), and sigma the standard deviation of e, which is 0 for a factor that acts linearly and without interactions, apart
+from the noise of the runs. Source: Morris 1991, Technometrics 33:161, doi 10.1080/00401706.1991.10484804; Campolongo,
+Cariboni and Saltelli 2007, Environ. Model. Softw. 22:1509, doi 10.1016/j.envsoft.2006.10.004.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
 SAME = 1e-9
-"""Coded levels that differ by less are one."""
+"""Coded levels that differ by less count as equal."""
 
 
 @dataclass(frozen=True)
 class ElementaryEffect(Record):
-    """Of one factor, from low to high, unit of the response; all NaN without an effect. effects: each of the steps.
+    """Effects of one factor, from low to high, unit of the response; all NaN without any. effects: that of each step.
 
-    mu_star_half_width: of the 95 % interval of mu*, by t. p: is mu zero, by t; p_holm: for all factors at once.
+    mu_star_half_width: half the 95 % t interval of mu*. p: t test that mu is zero; p_holm: for all factors at once.
     """
 
     factor: str
@@ -47,7 +47,7 @@ class ElementaryEffect(Record):
 
 @dataclass(frozen=True)
 class ElementaryEffects(Record):
-    """Of all factors. steps: pairs of runs that differ in one factor; lost: pairs of which a run is missing."""
+    """Effects of all factors. steps: pairs of runs that differ in one factor; lost: pairs in which a run is missing."""
 
     effects: tuple[ElementaryEffect, ...]
     steps: int
@@ -55,18 +55,18 @@ class ElementaryEffects(Record):
 
     @property
     def ranked(self) -> tuple[ElementaryEffect, ...]:
-        """The largest mu* first."""
+        """The effects by falling mu*."""
         return tuple(sorted(self.effects, key=lambda one: -one.mu_star if math.isfinite(one.mu_star) else math.inf))
 
 
 def elementary_effects(
     coded: FloatArray, responses: FloatArray, names: Sequence[str], others: FloatArray | None = None
 ) -> ElementaryEffects:
-    """Return the effects of rows in the order of their trajectories; a row's replicates count as their mean.
+    """Return the effects of rows in the order of their trajectories; replicates of a row are averaged.
 
-    coded: (rows, k), low = -1, high = +1. responses: (rows, replicates), NaN where a run is missing. others: the same
-    as coded of factors whose effects are not asked for, NaN where a level is unknown; they stay in every step.
-    Raises StatisticsError where no two neighbours differ in one factor alone.
+    coded: (rows, k), low = -1, high = +1. responses: (rows, replicates), NaN where a run is missing. others: like
+    coded, for factors whose effects are not wanted, NaN where a level is unknown; they must not change in a step.
+    Raises StatisticsError where no two consecutive rows differ in exactly one factor.
     """
     values = row_moments(require_matrix("responses", responses, rows=len(coded)))[0]
     moved = np.diff(coded if others is None else np.hstack([coded, others]), axis=0)
@@ -101,7 +101,7 @@ def _effect(name: str, effects: FloatArray) -> ElementaryEffect:
     if n < 2:
         return ElementaryEffect(name, effects, mu, mu_star, *(math.nan,) * 4)
     dust = 1e-9 * float(np.abs(effects).max())
-    # Effects that are all alike differ by rounding, which is no scatter.
+    # Effects that are all equal up to rounding have no scatter.
     sigma, spread = (float(one.std(ddof=1)) if np.ptp(one) > dust else 0.0 for one in (effects, np.abs(effects)))
     half = float(stats.t.ppf(0.975, n - 1)) * spread / math.sqrt(n)
     p = 2 * float(stats.t.sf(abs(mu) / (sigma / math.sqrt(n)), n - 1)) if sigma else float(mu == 0)

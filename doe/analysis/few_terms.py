@@ -1,11 +1,12 @@
-"""Few main effects and interactions that explain a two-level design whose effects share each other's columns in part.
+"""Models of few main effects and interactions for a two-level design whose effects are partially aliased.
 
-In a Plackett–Burman design every main effect carries a part (1/3 in 12 runs) of every interaction without it, so that a
-single large interaction hides as many small main effects. All models of at most `MOST_TERMS` terms are fitted in which
-every interaction stands beside one of its factors (weak effect heredity). Models are ranked by AICc = n ln(RSS/n) + 2 q
-+ 2 q (q + 1)/(n - q - 1) with q = terms + 2. A search always finds something: the same search is done on permuted
-responses, and p is the share of them whose best model of that size has at least the same R². Source: Hamada and Wu
-1992, J. Qual. Technol. 24:130 (heredity, partial aliasing); Hurvich and Tsai 1989, Biometrika 76:297 (AICc).
+In a Plackett–Burman design every main effect carries a part (1/3 in 12 runs) of every interaction that does not involve
+it, so that a single large interaction is spread over many small apparent main effects. All models of at most
+`MOST_TERMS` terms are fitted in which every interaction is accompanied by at least one of its factors (weak effect
+heredity). Models are ranked by AICc = n ln(RSS/n) + 2 q + 2 q (q + 1)/(n - q - 1) with q = terms + 2. Because a search
+always finds something, it is repeated on permuted responses; p is the share of these whose best model of the same size
+has at least the same R². Source: Hamada and Wu 1992, J. Qual. Technol. 24:130 (heredity, partial aliasing); Hurvich and
+Tsai 1989, Biometrika 76:297 (AICc).
 """
 
 from __future__ import annotations
@@ -26,15 +27,15 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 MOST_TERMS, MOST_FACTORS = 3, 11
 SHOWN, WITHIN = 5, 4.0
-"""Models that are kept: so many at most, with AICc this near to the lowest (Burnham and Anderson 2002, ch. 2)."""
+"""Most models kept, and their largest distance in AICc from the lowest (Burnham and Anderson 2002, ch. 2)."""
 PERMUTATIONS, SEED = 499, 1
 DUST = 1e-9
-"""Of a share: what rounding leaves."""
+"""Rounding error of a share."""
 
 
 @dataclass(frozen=True)
 class FewTermsModel(Record):
-    """A model with an intercept and `terms` ("F", "F*G"); p by permutation, of a model of as many terms."""
+    """A model with an intercept and `terms` ("F", "F*G"); p by permutation, among models of as many terms."""
 
     terms: tuple[str, ...]
     coefficients: FloatArray

@@ -1,15 +1,16 @@
-"""A Gaussian process through the runs: does it predict runs that it has not seen better than the polynomial?
+"""A Gaussian process fitted to the runs: does it predict unseen runs better than the polynomial?
 
 y = m + f(x) + e with f ~ GP(0, s_f^2 exp(-1/2 sum ((x_j - x'_j)/l_j)^2)), e ~ N(0, s_n^2), m with a flat prior;
-x coded, l_j the distance over which factor j changes the response (long: hardly at all). With R = correlations + g I,
-g = s_n^2/s_f^2, and P = R^-1 - R^-1 1 (1'R^-1 1)^-1 1'R^-1, the l_j and g make the restricted likelihood largest: with
+x coded, l_j the distance over which factor j changes the response (a long one: hardly any effect). With
+R = correlations + g I, g = s_n^2/s_f^2, and P = R^-1 - R^-1 1 (1'R^-1 1)^-1 1'R^-1, the l_j and g maximise the
+restricted likelihood, that is, they minimise
 
-    (n - 1) ln(y'Py) + ln|R| + ln(1'R^-1 1)     least, and then s_f^2 = y'Py/(n - 1).
+    (n - 1) ln(y'Py) + ln|R| + ln(1'R^-1 1)     and then s_f^2 = y'Py/(n - 1).
 
-Left out, the runs I of a set miss their prediction by (P_II)^-1 (Py)_I, of a single run (Py)_i/P_ii with the variance
-s_f^2/P_ii: no refit, l_j and g stay as they are (Rasmussen and Williams 2006, Gaussian Processes for Machine Learning,
-eq. 5.12, with P for the inverse because m is fitted again; Dubrule 1983, Math. Geol. 15:687). So is PRESS of a
-polynomial, whose terms stay as well.
+If a set I of runs is left out, their prediction errors are (P_II)^-1 (Py)_I; for a single run, (Py)_i/P_ii with the
+variance s_f^2/P_ii. Nothing is refitted, l_j and g stay fixed (Rasmussen and Williams 2006, Gaussian Processes for
+Machine Learning, eq. 5.12, with P for the inverse because m is fitted again; Dubrule 1983, Math. Geol. 15:687). This
+corresponds to PRESS of a polynomial, whose terms stay fixed as well.
 """
 
 from __future__ import annotations
@@ -37,10 +38,10 @@ LENGTHS = (0.1, 100.0)
 NOISE = (1e-8, 1e4)
 """Least and greatest g."""
 STARTS = tuple(product((0.5, 1.0, 3.0), (1e-4, 0.1)))
-"""Length of every factor and g from which the likelihood is climbed."""
+"""Starting values of the length (for all factors) and g in the maximisation of the likelihood."""
 FEWEST_RUNS, MOST_RUNS = 5, 500
 SAMPLE = 4096
-"""Points of the region among which settings are looked for."""
+"""Number of points of the region among which settings are searched for."""
 MOST_RAYS = 40
 
 
@@ -49,8 +50,8 @@ class GaussianProcess(Record):
     """A fitted process. lengths: coded, (k,). signal, noise: standard deviations s_f, s_n, unit of the response.
 
     Per run: points (n, k) coded, observed, row_of_run, left_out (observed less predicted without the run), left_out_sd.
-    press, press_by_row: sums of squares of what runs, or whole rows of the design, miss their prediction by; with the
-    R^2 of them about the mean.
+    press, press_by_row: sums of squared prediction errors with single runs, or whole rows of the design, left out; with
+    the corresponding R^2 about the mean.
     """
 
     region: Region
@@ -92,10 +93,10 @@ class GaussianProcess(Record):
 
 @dataclass(frozen=True)
 class ProcessTarget(Record):
-    """The setting for a target: of those that give it the one nearest the reference, or where the process comes nearest
-    to it. point: natural, (k,). predicted with its 95 % interval and the reachable values: unit of the response.
-    compatible_low, compatible_high: range of each factor over the part compatible_share of the region whose mean
-    differs from the target by no more than 1.96 standard errors; NaN where there is none.
+    """The setting for a target: of all settings that give it, the one nearest the reference; if none does, the setting
+    where the process comes nearest to it. point: natural, (k,). predicted with its 95 % interval and the reachable
+    values: unit of the response. compatible_low, compatible_high: range of each factor over that part of the region
+    (compatible_share) whose mean differs from the target by no more than 1.96 standard errors; NaN where there is none.
     """
 
     target: float
@@ -175,7 +176,7 @@ def _projected(points: FloatArray, lengths: FloatArray, ratio: float) -> tuple[F
 
 
 def _deviance(logs: FloatArray, points: FloatArray, y: FloatArray) -> tuple[float, FloatArray]:
-    """What is made least, and its slopes, by the logarithms of the lengths and of g."""
+    """The function to minimise and its gradient, in the logarithms of the lengths and of g."""
     lengths, ratio = np.exp(logs[:-1]), float(np.exp(logs[-1]))
     try:
         inverse, projected = _projected(points, lengths, ratio)
@@ -193,7 +194,7 @@ def _deviance(logs: FloatArray, points: FloatArray, y: FloatArray) -> tuple[floa
 
 
 def process_target(found: GaussianProcess, target: ResponseTarget) -> ProcessTarget:
-    """Return the setting at which the process gives the target, nearest the reference (coded distance)."""
+    """Return the setting nearest to the reference (coded distance) at which the process gives the target."""
     region, k = found.region, found.points.shape[1]
     sample = 2 * qmc.Sobol(k, rng=np.random.default_rng(0)).random(SAMPLE) - 1
     corners = np.array(list(product((-1.0, 1.0), repeat=min(k, 10))))
@@ -236,7 +237,7 @@ def process_target(found: GaussianProcess, target: ResponseTarget) -> ProcessTar
 
 
 def _nearest(found: GaussianProcess, target: float, reference: FloatArray, sample: FloatArray) -> FloatArray:
-    """The setting nearest the reference: where rays from it first cross the target, refined along the target."""
+    """The setting nearest to the reference: where rays from it first cross the target, refined along the target."""
     start = float(found.predict(reference)) - target
     if start == 0:
         return reference

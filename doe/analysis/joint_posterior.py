@@ -1,13 +1,13 @@
-"""All targets at once: what they say together of each factor, as a posterior over the region of the response surface.
+"""Joint posterior of the factors given all targets, over the region of the response surface.
 
     p(x | T) ∝ Π_t N(T_t | ŷ_t(x), s_t(x)²) over the cube, s_t² = (sd_t/√n_t)² + (standard error of ŷ_t at x)²
 
-with equal odds for every setting of the region beforehand. The models stand for the pours (a surrogate), so their lack
-of fit is not in it, and the errors of two models of the same pours count as independent. With up to four factors the
-integrals are sums over a grid: exact to its step, without a sampler and its convergence. The grid is made twice, the
-second time on the box that holds all but a millionth of each factor's posterior, and s_t² takes in how much ŷ_t varies
-within a cell, Σ_j (∂ŷ_t/∂x_j · step_j)²/12, so that a target without an error is met by a sheet of cells and not by the
-luck of one.
+with a uniform prior over the region. The models are surrogates for the pours: their lack of fit is not included, and
+the errors of two models of the same pours are treated as independent. With up to four factors the integrals are sums
+over a grid: exact to within its step, and without the convergence problems of a sampler. The grid is made twice, the
+second time on the box that holds all but a millionth of each factor's posterior. s_t² includes the variation of ŷ_t
+within a cell, Σ_j (∂ŷ_t/∂x_j · step_j)²/12, so that a target without an error is met by a sheet of cells and not by
+chance in a single one.
 
 Kennedy & O'Hagan 2001, doi 10.1111/1467-9868.00294 (calibration on a surrogate, here without a discrepancy); Gelman et
 al. 2013, Bayesian Data Analysis, ch. 3 and 6 (grids, posterior predictive).
@@ -30,28 +30,28 @@ from doe.target import Target
 FloatArray = npt.NDArray[np.float64]
 
 CELLS = {1: 401, 2: 161, 3: 41, 4: 21}
-"""Cells along a factor of the grid, by the number of factors."""
+"""Number of grid cells along each factor, by the number of factors."""
 KEPT = 31
-"""Cells along a factor of the densities that are kept."""
+"""Number of cells along each factor in the densities that are kept."""
 OPEN_SHARE = 0.5
-"""Share of the region from which on a 95 % interval leaves a factor open, as in `find_optimum`."""
+"""Width of a 95 % interval, as a share of the region, from which a factor is unidentified, as in `find_optimum`."""
 LEAST_ERROR = 1e-6
-"""Least standard error of a target, over its own size or that of its model."""
+"""Least standard error of a target, relative to its own size or that of its model."""
 NEGLIGIBLE = 1e-6
 """Share of the posterior that refining may lose at each end of a factor."""
 
 
 @dataclass(frozen=True)
 class JointPosterior(Record):
-    """What the targets say together. Factors in the order of the models, in natural units; k factors, m targets.
+    """Joint posterior of all targets. Factors in the order of the models, in natural units; k factors, m targets.
 
     ``density``: probability in each of ``KEPT`` equal cells between ``axis_low`` and ``axis_high``, shape (k, cells),
     and ``pair_density`` of each pair in the order of ``itertools.combinations``, shape (pairs, cells, cells), the first
     factor along the first axis. ``low`` and ``high``: 95 % interval, equal tails. ``predicted`` and ``predicted_sd``:
     the mean of each target's model over the posterior and its standard deviation, the model's own error included.
-    ``misfit``: the least Σ (ŷ_t − T_t)²/s_t². ``p``: the chance that χ² with a degree of freedom per target is larger,
-    which is that of the misfit at a setting that gives all targets; the least is no larger, so a small ``p`` is safe to
-    act on.
+    ``misfit``: the least Σ (ŷ_t − T_t)²/s_t². ``p``: the probability that χ² with one degree of freedom per target is
+    larger. This χ² is the distribution of the misfit at a setting that truly gives all targets; the least misfit cannot
+    be larger than that, so ``p`` is conservative and a small value can be acted on.
     """
 
     names: tuple[str, ...]
@@ -65,7 +65,7 @@ class JointPosterior(Record):
     high: FloatArray
     correlation: FloatArray
     share: FloatArray
-    """Width of the 95 % interval over that of the region."""
+    """Width of the 95 % interval as a share of that of the region."""
     predicted: FloatArray
     predicted_sd: FloatArray
     misfit: float
@@ -73,15 +73,15 @@ class JointPosterior(Record):
 
     @property
     def identified(self) -> tuple[bool, ...]:
-        """Whether the targets fix each factor to less than half of the region."""
+        """Whether the targets determine each factor to within less than half of the region."""
         return tuple(bool(part < OPEN_SHARE) for part in self.share)
 
 
 def joint_posterior(models: Sequence[Surface], targets: Sequence[Target]) -> JointPosterior | None:
-    """The posterior of the factors of ``models``, one per target; None with more than four factors.
+    """Return the posterior of the factors of ``models``, one per target; None with more than four factors.
 
-    Where not even the best setting comes within 30 standard errors of the targets, it is the neighbourhood of that
-    setting, and ``misfit`` says that it is no answer.
+    If not even the best setting comes within 30 standard errors of the targets, the posterior is the neighbourhood of
+    that setting, and ``misfit`` shows that it is not an answer.
     """
     k = len(models[0].names)
     if k not in CELLS:
@@ -95,7 +95,7 @@ def joint_posterior(models: Sequence[Surface], targets: Sequence[Target]) -> Joi
         weight = np.exp(log - log.max())
         weight = (weight / weight.sum()).reshape([CELLS[k]] * k)
         step = (high - low) / CELLS[k]
-        # Marginals that fill a few cells only are looked at again, on a grid of their own.
+        # Marginals that fill only a few cells are computed again on a finer grid.
         low, high = _box(weight, axes, step)
     return _summary(models, targets, axes, grid, weight, _least_misfit(models, targets, grid[chi2.argmin()]))
 
@@ -107,7 +107,7 @@ def _grid(low: FloatArray, high: FloatArray, cells: int) -> tuple[list[FloatArra
 
 
 def least_error(model: Surface, target: Target) -> float:
-    """Least standard error to tell a miss by, of a model without error or slope against a target without error."""
+    """Return the least standard error used for a model without error or slope and a target without error."""
     return max(LEAST_ERROR * max(abs(target.mean), abs(float(model.coefficients[0]))), np.finfo(np.float64).tiny)
 
 

@@ -1,10 +1,10 @@
 """Where a second-order model takes a given value inside the coded cube, for many models at once.
 
 On a line parallel to an axis the model is a quadratic in one unknown, so its crossings with the target are
-exact roots; a grid of such lines samples the whole surface {x : model(x) = target}, and finer grids around
+exact roots. A grid of such lines samples the whole surface {x : model(x) = target}, and finer grids around
 the best point find the one nearest to a reference. The extremes of the model over the cube lie at stationary
-points of its faces, which are linear systems. Everything is deterministic and has no starting values.
-`models` = leading axis, one per coefficient set.
+points of its faces, which are solutions of linear systems. Everything is deterministic and needs no starting values.
+`models` = leading axis, one entry per coefficient set.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ BoolArray = npt.NDArray[np.bool_]
 
 COARSE_LINES = 15
 COARSE_LINES_4 = 9
-"""The same for four factors and more, whose lines stand on a grid of three dimensions and more."""
+"""The same for four or more factors, whose lines form a grid of three or more dimensions."""
 FINE_LINES = 7
 REFINEMENTS = 19
 BLOCK = 5_000_000
-"""Coordinates that are held at once; more models are worked off in blocks."""
+"""Number of coordinates held in memory at once; more models are processed in blocks."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def extremes(coefficients: FloatArray, k: int) -> Extremes:
             singular = np.abs(np.linalg.det(block)) <= 1e-14 * np.abs(block).max(axis=(1, 2)) ** free.size
             block[singular] = np.eye(free.size)
             point[:, free] = np.linalg.solve(block, -pull[..., None])[..., 0]
-            # Any point of the cube is a harmless candidate; a corner stands in where the face has none.
+            # Any point of the cube is a harmless candidate: a corner replaces a missing stationary point.
             outside = singular | (np.abs(point) > 1).any(axis=1)
             point[outside] = 1.0
         candidates.append(point)
@@ -79,8 +79,8 @@ def nearest_points(
 
     coefficients: shape (models, p). target: one for all models, or shape (models,). reference: coded, shape
     (k,), may lie outside the cube. scale: shape (k,); the distance is sum ((x_i - reference_i)/scale_i)^2.
-    Where the model cannot reach the target the point is its extreme nearest in value. Returns shapes (models,
-    k) and (models,). Accuracy about 1e-6 in coded units; every refinement less doubles that.
+    If the model cannot reach the target, the point is that of the extreme nearest in value. Returns shapes (models,
+    k) and (models,). Accuracy about 1e-6 in coded units; each refinement less doubles the error.
     """
     k = reference.size
     block = max(1, BLOCK // (2 * k * k * _coarse_lines(k) ** (k - 1)))

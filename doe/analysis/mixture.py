@@ -1,8 +1,9 @@
-"""Scheffé's polynomials of a mixture: y = sum b_i z_i + sum b_ij z_i z_j + sum b_ijk z_i z_j z_k + e, by least squares.
+"""Scheffé polynomials of a mixture: y = sum b_i z_i + sum b_ij z_i z_j + sum b_ijk z_i z_j z_k + e, by least squares.
 
-The shares z_i of the room above the lows add up to 1 (`doe.designs.mixture`), so that there is no intercept and no
-square: b_i is the response where part i has all of the room, b_ij > 0 says that two parts together give more than
-their mean. Source: Scheffé 1958, J. Roy. Stat. Soc. B 20:344; Cornell 2002, Experiments with Mixtures, ch. 2.
+z_i is the share of part i in the amount above the lows (`doe.designs.mixture`, pseudocomponents). The shares add up to
+1, so there is no intercept and no square: b_i is the response where part i takes all of that amount, and b_ij > 0 means
+that two parts together give more than their mean. Source: Scheffé 1958, J. Roy. Stat. Soc. B 20:344; Cornell 2002,
+Experiments with Mixtures, ch. 2.
 """
 
 from __future__ import annotations
@@ -28,17 +29,17 @@ FloatArray = npt.NDArray[np.float64]
 MixtureOrder = Literal["linear", "quadratic", "special cubic"]
 MIXTURE_ORDERS: tuple[MixtureOrder, ...] = get_args(MixtureOrder)
 LEAST_DF = 3
-"""For the error, where no order is asked for."""
+"""Degrees of freedom for the error, where no order is asked for."""
 SLACK = 1e-9
-"""Of a high, in shares."""
+"""Tolerance of a high, in shares."""
 STEPS = (1000, 100, 40, 20, 10, 8, 6, 5, 4, 3, 2)
 MOST_LOOKED_AT = 13_000
-"""The highest and the lowest blend are looked for in the smallest steps that make no more blends than these."""
+"""The highest and the lowest blend are searched for in the smallest steps that give no more blends than this."""
 
 
 @dataclass(frozen=True)
 class Blend(Record):
-    """A blend of the parts, in their unit, with the response of the model there and the standard error of its mean."""
+    """A blend of the parts, in their unit, with the response of the model and the standard error of its mean."""
 
     amounts: FloatArray
     predicted: float
@@ -47,10 +48,10 @@ class Blend(Record):
 
 @dataclass(frozen=True)
 class MixtureFit(Record):
-    """A fitted polynomial. terms: "A", "A*B", "A*B*C" with coefficients, their standard errors and p (of a product: is
-    it zero? NaN of single parts, for which that is no question).
+    """A fitted polynomial. terms: "A", "A*B", "A*B*C" with coefficients, their standard errors and p (of the test that
+    a product is zero; NaN for single parts, where that test has no meaning).
 
-    rows: analysis of variance, the orders one after the other, about the mean. highest, lowest: within step of a share.
+    rows: sequential analysis of variance by order, about the mean. highest, lowest: located to within step of a share.
     """
 
     order: MixtureOrder
@@ -87,8 +88,8 @@ def mixture_matrix(shares: FloatArray, terms: Sequence[tuple[int, ...]]) -> Floa
 
 
 def bearable_order(shares: FloatArray, names: Sequence[str]) -> MixtureOrder | None:
-    """Return the highest order that runs at shares bear with 3 degrees of freedom for the error, else with one; None
-    where there is none.
+    """Return the highest order that runs at shares support with 3 degrees of freedom for the error, else with one; None
+    if they support none.
     """
     able: dict[MixtureOrder, int] = {}
     for order in MIXTURE_ORDERS[: len(names)]:  # two parts have no term of three
@@ -107,11 +108,11 @@ def fit_mixture(
     order: MixtureOrder | None = None,
     highs: FloatArray | None = None,
 ) -> MixtureFit:
-    """Fit the polynomial of an order, or of the highest that the runs bear, to every valid run.
+    """Fit the polynomial of the given order, or of the highest that the runs support, to every valid run.
 
-    amounts: shape (rows, parts), of one sum in every row. responses: (rows, replicates), NaN where a run is missing.
-    lows: least amount of each part; highs: the most of it in a blend that is looked for.
-    Raises StatisticsError where the runs do not bear it.
+    amounts: shape (rows, parts), with the same sum in every row. responses: (rows, replicates), NaN where a run is
+    missing. lows: least amount of each part; highs: its greatest amount in the blends searched.
+    Raises StatisticsError where the runs do not support the polynomial.
     """
     _, row, observed = valid_runs(responses, len(amounts))
     room = float(amounts.sum(axis=1).mean() - lows.sum())
@@ -130,7 +131,7 @@ def fit_mixture(
             "mixture polynomial and an error"
         )
     found = least_squares(model, observed)
-    # The shares add up to one: what was taken from every response goes back to the single parts.
+    # The shares add up to one: the constant subtracted from every response is returned to the single parts.
     single = np.array([len(term) == 1 for term in terms])
     coefficients = found.params + single * observed[0]
     predicted = model @ coefficients
@@ -174,14 +175,14 @@ def fit_mixture(
 
 
 def _squares(differences: FloatArray, total: float) -> float:
-    """Return their sum of squares, zero where the total is, of which rounding alone is left."""
+    """Return the sum of squares of differences; zero if the total is zero, since then only rounding is left."""
     return float((differences**2).sum()) if total else 0.0
 
 
 def _within(
     lattice: FloatArray, run: FloatArray, lows: FloatArray, highs: FloatArray | None, room: float
 ) -> FloatArray:
-    """Return the blends of a lattice that keep to the highs; those that were run where it has none."""
+    """Return the blends of a lattice that respect the highs; if there are none, the blends that were run."""
     if highs is None:
         return lattice
     kept = lattice[(lows + room * lattice <= highs + SLACK * room).all(axis=1)]
@@ -197,7 +198,7 @@ def _rows(
     residual: float,
     df: int,
 ) -> tuple[AnovaRow, ...]:
-    """The orders one after the other, each by what it takes from the residual of the one before."""
+    """One row per order: the reduction of the residual of the order before."""
 
     def row(source: str, squares: float, own: int, against: tuple[float, int] | None) -> AnovaRow:
         mean = squares / own if own else math.nan

@@ -1,4 +1,4 @@
-"""Is a fitted model at odds with single runs, and would it fit another power of the response better?
+"""Does a fitted model disagree with single runs, and would it fit another power of the response better?
 
 Single runs: leverage, studentised residuals, Cook's distance, DFFITS.
 h_i leverage, e_i residual, s^2 = MSE, p terms: internal r_i = e_i/(s sqrt(1 - h_i)); external t_i the same with s
@@ -7,8 +7,8 @@ Source: Cook 1977, Technometrics 19:15; Belsley, Kuh and Welsch 1980, Regression
 
 Power of the response: the Box–Cox profile.
 z_i = (y_i^L - 1)/(L g^(L - 1)) with g the geometric mean (g ln y_i for L = 0) makes the residual sums of squares of all
-powers comparable. The interval holds every L with SS(L) <= SS(best) (1 + t^2/df), t of the level and of the model's
-residual degrees of freedom, which for few runs is wider than that of the likelihood.
+powers comparable. The interval holds every L with SS(L) <= SS(best) (1 + t^2/df), with t for the level and the model's
+residual degrees of freedom; for few runs it is wider than the likelihood interval.
 Source: Box and Cox 1964, J. Roy. Stat. Soc. B 26:211; Montgomery 2017, Design and Analysis of Experiments, eq. 15.2.
 """
 
@@ -33,11 +33,11 @@ NAMED = {-2.0: "1/y²", -1.0: "1/y", -0.5: "1/√y", 0.0: "ln y", 0.5: "√y", 1
 
 @dataclass(frozen=True)
 class Diagnostics(Record):
-    """Per run of the surface, shape (runs,); NaN where a run decides its own fit (leverage one) or there is no error.
+    """Per run of the surface, shape (runs,); NaN if a run determines its own fit (leverage one) or there is no error.
 
     outlier_limit: |external| at which p = 0.05 for the largest of all runs (Bonferroni). leverage_limit: 2p/n.
-    outliers, leveraged, influential: positions of the runs beyond |external| > outlier_limit, leverage > 2p/n, D > 1.
-    shapiro_p: of normality of the internal residuals (Shapiro and Wilk 1965).
+    outliers, leveraged, influential: positions of runs with |external| > outlier_limit, leverage > 2p/n, D > 1.
+    shapiro_p: test of normality of the internal residuals (Shapiro and Wilk 1965).
     """
 
     residual: FloatArray
@@ -57,10 +57,10 @@ class Diagnostics(Record):
 @dataclass(frozen=True)
 class BoxCox(Record):
     """Profile over `powers`, shape (powers,): ln SS(L), and its limit for the interval. best with its 95 % interval
-    [low, high], both cut to the grid.
+    [low, high], both limited to the grid.
 
-    suggestion: "none" where the interval holds 1; else the named power of `NAMED` inside it that is nearest to the
-    best, or the best itself. note: why there is no profile; "" where there is one.
+    suggestion: "none" if the interval contains 1; otherwise the named power of `NAMED` inside it that is nearest to
+    the best, or the best itself. note: why there is no profile; "" where there is one.
     """
 
     powers: FloatArray
@@ -92,7 +92,7 @@ def diagnose_fit(surface: Surface, anova: SurfaceAnova) -> Diagnostics:
     df = surface.df_residual - 1
     limit = float(stats.t.ppf(1 - 0.025 / n, df)) if df > 0 else math.nan
     known = internal[np.isfinite(internal)]
-    # Three values are the least that the test takes; equal ones carry no shape.
+    # The test needs at least three values; equal values have no shape to test.
     normal = known.size >= 3 and float(np.ptp(known)) > 0
     return Diagnostics(
         residual=surface.observed - surface.predicted,
@@ -111,7 +111,7 @@ def diagnose_fit(surface: Surface, anova: SurfaceAnova) -> Diagnostics:
 
 
 def box_cox(surface: Surface, level: float = 0.95) -> BoxCox:
-    """Return the profile of the model's own terms. There is none for a response that is not above zero everywhere,
+    """Return the profile for the terms of the model. There is none for a response that is not positive everywhere,
     that does not vary, or that the model fits exactly.
     """
     y = surface.observed

@@ -1,7 +1,7 @@
-"""Which polynomial the runs of a design can bear: linear, with interactions of two, or full second order.
+"""The polynomials that the runs of a design support: linear, with interactions of two factors, or full second order.
 
-The fit summary adds one order after the other: SS of an order is what it takes from the residual of the one before,
-tested against its own residual. Source: Myers, Montgomery and Anderson-Cook 2016, Response Surface Methodology, ch. 2.
+The fit summary is sequential: SS of an order is the reduction of the residual of the order before, tested against its
+own residual. Source: Myers, Montgomery and Anderson-Cook 2016, Response Surface Methodology, ch. 2.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ Order = Literal["linear", "interactions", "quadratic"]
 ORDERS: tuple[Order, ...] = get_args(Order)
 Reduction = Literal["aicc", "p"]
 STAYS = 0.05
-"""A term with a larger p is dropped, by the rule p."""
+"""A term with a larger p is dropped under the rule "p"."""
 
 
 @dataclass(frozen=True)
 class OrderFit(Record):
-    """One order of polynomial on these runs. f, p: of what it adds to the order before; NaN where nothing tests it.
+    """One order of polynomial on these runs. f, p: test of what it adds to the order before; NaN if it is not tested.
 
-    estimable: False where the runs cannot separate its terms or leave no error; the numbers are then NaN.
+    estimable: False if the runs cannot separate its terms or leave no error; the numbers are then NaN.
     sigma: residual standard deviation, unit of the response. lack_of_fit_p: NaN without replicates.
     """
 
@@ -71,9 +71,9 @@ def terms_of(names: Sequence[str], order: Order) -> tuple[str, ...]:
 
 
 def hierarchical(names: Sequence[str], terms: Sequence[str]) -> tuple[str, ...]:
-    """Return `terms` with the linear terms that their products and squares stand on, in the order of the model.
+    """Return `terms` together with the linear terms of their products and squares, in the order of the model.
 
-    A product or square without them would change its meaning with the origin of the coding (Nelder 1977).
+    Without these, the meaning of a product or square would change with the origin of the coding (Nelder 1977).
     """
     wanted = set(terms)
     for term in terms:
@@ -85,8 +85,8 @@ def hierarchical(names: Sequence[str], terms: Sequence[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class ReducedModel(Record):
-    """Terms that a backward elimination left, and those that it dropped, in turn. criterion: AICc of the model that is
-    left, NaN by the rule p.
+    """Terms that a backward elimination kept, and those that it dropped, in order. criterion: AICc of the final model,
+    NaN under the rule "p".
     """
 
     rule: Reduction
@@ -103,11 +103,12 @@ def reduced_model(
     rule: Reduction,
     blocks: Blocks | None = None,
 ) -> ReducedModel:
-    """Drop one term after the other; a factor stays while a product or square of it is in the model.
+    """Drop terms one by one; a factor stays while a product or square of it is in the model.
 
-    By "aicc" the term without which AICc = n ln(SSE/n) + 2 q + 2 q (q + 1)/(n - q - 1) is least, as long as it falls; q
-    counts the coefficients, the blocks' and sigma (Hurvich and Tsai 1989, Biometrika 76:297). By "p" the term of the
-    largest p, as long as that is above 0.05. Raises StatisticsError where the runs do not bear `terms`.
+    Under "aicc" the term is dropped whose removal makes AICc = n ln(SSE/n) + 2 q + 2 q (q + 1)/(n - q - 1) least, as
+    long as AICc falls; q counts the coefficients, those of blocks, and sigma (Hurvich and Tsai 1989, Biometrika
+    76:297). Under "p" the term with the largest p is dropped, as long as that is above 0.05. Raises StatisticsError
+    where the runs do not support `terms`.
     """
 
     def residual(kept: Sequence[str]) -> tuple[float, int]:
@@ -119,9 +120,10 @@ def reduced_model(
 def eliminate(
     terms: Sequence[str], rule: Reduction, residual: Callable[[Sequence[str]], tuple[float, int]], runs: int
 ) -> ReducedModel:
-    """Drop one term after the other from any linear model, as `reduced_model` says; a term may have several columns.
+    """Drop terms one by one from any linear model, as in `reduced_model`; a term may have several columns.
 
-    residual: of a model of these terms, the sum of squares and its degrees of freedom. runs: number of valid ones.
+    residual: function of the terms of a model that returns its residual sum of squares and degrees of freedom. runs:
+    number of valid runs.
     """
     left, dropped = list(terms), []
     fitted = residual(left)
@@ -144,7 +146,7 @@ def eliminate(
 
 
 def corrected_aic(squares: float, df: int, n: int) -> float:
-    """Return AICc of n runs by the residual sum of squares with its df; infinite where there are too few runs."""
+    """Return AICc of n runs from the residual sum of squares and its df; infinite if there are too few runs."""
     q = n - df + 1
     if n - q - 1 < 1:
         return math.inf
@@ -152,7 +154,7 @@ def corrected_aic(squares: float, df: int, n: int) -> float:
 
 
 def _parts(term: str) -> tuple[str, ...]:
-    """The linear terms that a product or a square stands on; none of a linear one."""
+    """The linear terms contained in a product or a square; none for a linear term."""
     return tuple(term.removesuffix("^2").split("*")) if term.endswith("^2") or "*" in term else ()
 
 
@@ -163,7 +165,7 @@ def _residual(surface: Surface) -> tuple[float, int]:
 def fit_summary(
     coded: FloatArray, responses: FloatArray, region: Region, blocks: Blocks | None = None
 ) -> tuple[OrderFit, ...]:
-    """Return the three orders on the valid runs; shapes as in `doe.analysis.surface.fit_surface`."""
+    """Return the fits of the three orders to the valid runs; shapes as in `doe.analysis.surface.fit_surface`."""
     found: list[OrderFit] = []
     before = _means_only(responses, blocks)
     for order in ORDERS:
@@ -203,7 +205,7 @@ def bearable(
     terms: Sequence[str],
     blocks: Blocks | None = None,
 ) -> bool:
-    """Return whether the valid runs separate `terms`, and the blocks, and leave an error."""
+    """Return whether the valid runs can separate `terms` and the blocks, and leave an error."""
     values, row, _ = valid_runs(responses, len(coded))
     model = second_order_terms(coded[row])[:, included_terms(names, terms)]
     if blocks is not None:
@@ -219,9 +221,9 @@ def highest_order(
     least_df: int = 3,
     blocks: Blocks | None = None,
 ) -> Order:
-    """Return the highest order that the runs bear with at least `least_df` degrees of freedom for the error.
+    """Return the highest order that the runs support with at least `least_df` degrees of freedom for the error.
 
-    Without one, the highest that they bear at all. Raises StatisticsError where not even the linear one is.
+    If there is none, the highest that they support at all. Raises StatisticsError if not even the linear one is.
     """
     runs = int((~np.isnan(responses)).sum())
     able = [order for order in ORDERS if bearable(coded, responses, names, terms_of(names, order), blocks)]

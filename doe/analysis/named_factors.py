@@ -1,16 +1,16 @@
-"""Factors that are names (a solvent, a supplier, a machine) beside numbers: which act, and what does each name give?
+"""Categorical factors (a solvent, a supplier, a machine) beside numerical ones: which act, and what each name gives.
 
 y = sum over terms of columns times coefficients + e, by least squares. A factor of c names has c - 1 columns, contrasts
-that sum to zero over its names; a number x, and x^2; an interaction has all products of the columns of its factors. A
-term is tested by all its columns t together: SS = b_t' [(X'X)^-1_tt]^-1 b_t on as many degrees of freedom, the partial
-(Type III) sum of squares, which is the same for all contrasts that sum to zero. Blocks have fixed effects.
+that sum to zero over its names; a number has x, and x^2; an interaction has all products of the columns of its factors.
+A term is tested by all its columns t together: SS = b_t' [(X'X)^-1_tt]^-1 b_t on as many degrees of freedom, the
+partial (Type III) sum of squares, which is the same for all contrasts that sum to zero. Blocks have fixed effects.
 
-The mean of a name is the model there, averaged with equal weight over the names of all other factors and blocks, every
-number in its middle; its effect is what that differs from the mean of all names (sum coding). Source: Searle, Speed and
-Milliken 1980, Am. Stat. 34:216, doi 10.1080/00031305.1980.10483031.
+The mean of a name is the prediction for it, averaged with equal weight over the names of all other factors and blocks,
+with every number in its middle (least-squares mean); its effect is the difference of that from the mean of all names
+(sum coding). Source: Searle, Speed and Milliken 1980, Am. Stat. 34:216, doi 10.1080/00031305.1980.10483031.
 
 For one combination of names the model is a second-order polynomial of the numbers alone: its settings for a target are
-found as those of a surface are (`doe.analysis.level_set`).
+found like those of a surface (`doe.analysis.level_set`).
 """
 
 from __future__ import annotations
@@ -51,17 +51,17 @@ FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]
 LEAST_DF = 3
-"""For the error, where no order is asked for."""
+"""Degrees of freedom for the error, where no order is asked for."""
 MOST_COMBINATIONS = 64
-"""Of names that are all listed; of more only those that were run."""
+"""Most combinations of names that are all listed; if there are more, only those that were run are listed."""
 MOST_SOLVED = 4
-"""Numbers up to which the settings that give a target are searched for."""
+"""Most numerical factors for which the settings that give a target are searched for."""
 
 
 @dataclass(frozen=True)
 class NameMean(Record):
     """The mean response of a name of a factor with its 95 % interval, and its effect: mean less the mean of all names,
-    with standard error and p (is it zero? by t); all in the unit of the response but p.
+    with standard error and p (t test that it is zero); all but p in the unit of the response.
     """
 
     factor: str
@@ -78,9 +78,10 @@ class NameMean(Record):
 class NameSetting(Record):
     """The numbers that give the target with one combination of names; arrays of shape (numbers,), natural units.
 
-    point: of all settings that give it the one nearest the reference, or where the model comes nearest to it. predicted
-    with its 95 % interval. solution_low, solution_high: range of each number while the model gives the target.
-    compatible_share: of the region, where the mean differs from the target by no more than its 95 % margin.
+    point: of all settings that give the target, the one nearest the reference, or where the model comes nearest to the
+    target. predicted with its 95 % interval. solution_low, solution_high: range of each number while the model gives
+    the target. compatible_share: share of the region where the mean differs from the target by no more than its 95 %
+    margin.
     """
 
     reached: bool
@@ -95,8 +96,8 @@ class NameSetting(Record):
 
 @dataclass(frozen=True)
 class NameGroup(Record):
-    """One combination of names: number of runs with it, the model with all numbers in the middle (95 % interval), and
-    its polynomial of the numbers, term layout as of a `Surface`. setting: None without a target.
+    """One combination of names: its number of runs, the prediction with all numbers in the middle (95 % interval), and
+    its polynomial of the numbers, with the term layout of a `Surface`. setting: None without a target.
     """
 
     names: tuple[str, ...]
@@ -114,9 +115,10 @@ class NameGroup(Record):
 class NamedFit(Record):
     """A fitted model of factors that are names and factors that are numbers.
 
-    levels: names of each factor, () of a number. rows: as of `SurfaceAnova`, one per term with all its degrees of
-    freedom. means: of factors that are terms of the model. groups: combinations of names. studentized: externally, per
-    run. outliers: positions of runs beyond outlier_limit (p = 0.05 for the largest of all, Bonferroni).
+    levels: names of each factor, () for a number. rows: as in `SurfaceAnova`, one per term with all its degrees of
+    freedom. means: for factors that are terms of the model. groups: combinations of names. studentized: externally
+    studentised residuals, per run. outliers: positions of runs beyond outlier_limit (p = 0.05 for the largest of all,
+    Bonferroni).
     """
 
     levels: tuple[tuple[str, ...], ...]
@@ -142,12 +144,12 @@ class NamedFit(Record):
 
 
 def term_of(column: str) -> str:
-    """Return the term that a column of `model_terms` belongs to: "A*B" of "A[2]*B"."""
+    """Return the term to which a column of `model_terms` belongs: "A*B" for "A[2]*B"."""
     return re.sub(r"\[\d+\]", "", column)
 
 
 def columns_of(levels: Sequence[int], terms: Sequence[str]) -> Terms:
-    """Return the columns of the intercept and of `terms`. levels: number of names per factor, 0 of a number.
+    """Return the columns of the intercept and of `terms`. levels: number of names per factor, 0 for a number.
 
     Raises StatisticsError for the square of a factor of names.
     """
@@ -182,7 +184,7 @@ class _Runs:
         return float(found.ssr), int(found.df_resid)
 
     def df(self, terms: Sequence[str]) -> int:
-        """Degrees of freedom for the error; below zero where the runs do not tell the terms apart."""
+        """Degrees of freedom for the error; below zero if the runs cannot separate the terms."""
         model = self.matrix(terms)
         return len(model) - model.shape[1] if np.linalg.matrix_rank(model) == model.shape[1] else -1
 
@@ -200,10 +202,11 @@ def fit_named(
 ) -> NamedFit:
     """Fit a model to every valid run.
 
-    coded: (rows, k), of a factor of names the codes of `doe.designs.optimal`. responses: (rows, replicates), NaN where
-    a run is missing. levels: names per factor, () of a number. The others as of `doe.analysis.analyse.analyse_design`;
-    the highest order leaves 3 degrees of freedom for the error, if any does.
-    Raises StatisticsError where the runs do not bear the model.
+    coded: (rows, k), for a factor of names the codes of `doe.designs.optimal`. responses: (rows, replicates), NaN where
+    a run is missing. levels: names per factor, () for a number. The other arguments are those of
+    `doe.analysis.analyse.analyse_design`; by default the highest order that leaves 3 degrees of freedom for the error,
+    if any does.
+    Raises StatisticsError where the runs do not support the model.
     """
     values, row, observed = valid_runs(responses, len(coded))
     none = ((), np.zeros(len(row), dtype=np.int64))
@@ -267,10 +270,10 @@ def orders_of(levels: Sequence[int]) -> dict[Order, tuple[str, ...]]:
 
 
 def order_of_names(coded: FloatArray, levels: Sequence[int], block: IntArray | None = None) -> Order | None:
-    """Return the highest order that runs at `coded`, (runs, k), bear; None where they leave no error.
+    """Return the highest order that runs at `coded`, (runs, k), support; None if they leave no error.
 
-    levels: number of names per factor, 0 of a number. block: in which each run is made, (runs,), from 0; None or empty
-    without blocks. The highest leaves 3 degrees of freedom for the error, if any does.
+    levels: number of names per factor, 0 for a number. block: the block of each run, (runs,), from 0; None or empty
+    without blocks. The highest order leaves 3 degrees of freedom for the error, if any does.
     """
     n = len(coded)
     own = np.zeros(n, dtype=np.int64) if block is None or not block.size else block
@@ -286,12 +289,12 @@ def _highest(runs: _Runs) -> Order | None:
 
 
 def _terms(runs: _Runs, order: Order | None) -> tuple[str, ...]:
-    """The terms of an order, or of the highest that the runs bear."""
+    """The terms of an order, or of the highest that the runs support."""
     return orders_of(runs.levels)[order or _highest(runs) or "linear"]
 
 
 def _unbearable(runs: _Runs, terms: tuple[str, ...]) -> str:
-    """Which terms the runs do not tell apart, or that they leave no error."""
+    """Message on which terms the runs cannot separate, or that they leave no error."""
     columns = columns_of(runs.levels, terms)
     lost = dict.fromkeys(
         term_of(name)
@@ -330,9 +333,9 @@ def _rows(runs: _Runs, terms: tuple[str, ...], found: Any, total: float, mse: fl
 def mean_contrasts(
     levels: Sequence[tuple[str, ...]], terms: Sequence[str], columns: Terms, letters: Sequence[str]
 ) -> list[tuple[str, str, FloatArray, FloatArray]]:
-    """Return factor, name, and the contrasts of the columns that give its mean and its effect, of every name.
+    """Return, for every name, its factor, the name, and the contrasts of the columns that give its mean and its effect.
 
-    Contrasts sum to zero, and so does what is averaged: only the columns of the factor alone are left.
+    Contrasts sum to zero, so averaging removes all columns except those of the factor alone.
     """
     found = []
     for factor, names in enumerate(levels):
@@ -424,7 +427,7 @@ def _surface(fit: NamedFit, numbers: Region, coefficients: FloatArray, covarianc
         coefficients=coefficients,
         coefficients_natural=natural_coefficients(coefficients, numbers),
         information_inverse=covariance,
-        mse=1.0,  # the covariance holds it
+        mse=1.0,  # it is contained in the covariance
         df_residual=fit.df_residual,
         points=np.zeros((0, len(numbers.names))),
         row_of_run=no_run,
@@ -437,7 +440,7 @@ def _surface(fit: NamedFit, numbers: Region, coefficients: FloatArray, covarianc
 
 
 def _setting(surface: Surface, target: ResponseTarget, reference: FloatArray) -> NameSetting:
-    """Where the polynomial gives the target; without numbers the names alone give it within its error, or do not."""
+    """Where the polynomial gives the target; without numbers, whether the names alone give it to within its error."""
     k, region = len(surface.names), surface.region
     share = compatible_share(surface, target.value, target.standard_error)
     if not k:

@@ -1,22 +1,22 @@
-"""Optimum: of all settings that give the target, the one nearest to the measured parameters, and how sure it is.
+"""Optimum: of all settings that give the target, the one nearest to the measured parameters, with its uncertainty.
 
 The settings with model = target form a surface in the cube, so one target cannot fix several factors. The
-chosen point minimises sum ((x_i - reference_i)/scale_i)^2 on that surface. Reported beside it: the bootstrap
+chosen point minimises sum ((x_i - reference_i)/scale_i)^2 on that surface. Reported with it: the bootstrap
 interval of the point (the target's own standard error included), the range that each factor can take on the
 surface (its width), and the share of the cube whose predicted mean is compatible with the target at 95 %.
-The interval is that of the rule's choice: it says what is known of a factor only where the factor is identified.
-The bootstrap fits the same model to many resampled copies of the runs, in one solve.
+The interval is that of the point chosen by this rule; it states what is known about a factor only if the factor is
+identified. The bootstrap fits the same model to many resampled copies of the runs, in one solve.
 Source: Davison and Hinkley 1997, Bootstrap Methods and their Application, ch. 6; Myers, Montgomery and Anderson-Cook
 2016, ch. 6-7.
 
-Of several targets the setting is taken whose predicted responses miss them least, in units of what is known:
+With several targets, the setting is chosen whose predicted responses miss them least, relative to the uncertainties:
 
     J(x) = Σ_t w_t (ŷ_t(x) − T_t)² / s_t²
 
-with s_t² = sd_t²/n_t + (standard error of the model at the centre)², so that a target counts by how well it is
-known on both sides; ties (a valley of equal J) are broken by the distance to the measured parameters. Weighted least
-squares on response surfaces. The desirability of Derringer & Suich 1980 is told beside it, with the margins of
-equivalence as its limits; it is not maximised, because what is outside a margin has no slope in it.
+with s_t² = sd_t²/n_t + (standard error of the model at the centre)², so that each target is weighted by how precisely
+it is measured and modelled; ties (a valley of equal J) are broken by the distance to the measured parameters. This is
+weighted least squares on response surfaces. The desirability of Derringer & Suich 1980 is reported as well, with the
+margins of equivalence as its limits; it is not maximised, because outside a margin it has no slope.
 """
 
 from __future__ import annotations
@@ -46,17 +46,17 @@ Resampling = Literal["replicates within points", "residuals"]
 WIDTH_LINES = 81
 WIDTH_LINES_4 = 31
 CLOUD_REFINEMENTS_4 = 9
-"""The same for four factors and more, whose lines stand on a grid of three dimensions and more, and the refinements of
-a refit's point there, to about 1e-3 half-widths.
+"""The same for four or more factors, whose lines form a grid of three or more dimensions, and the number of refinements
+of a refit's point there, to about 1e-3 half-widths.
 """
 SHARE_LEVELS = 21
 TIE = 1e-3
-"""Weight of the squared coded distance to the reference: decides only where the misfit does not."""
+"""Weight of the squared coded distance to the reference, which decides only where the misfit does not."""
 
 
 @dataclass(frozen=True)
 class ResponseTarget(Record):
-    """What the response should be, the standard error of that value, and the setting to stay near (natural, (k,))."""
+    """The wanted response, its standard error, and the setting to stay near (natural, (k,))."""
 
     value: float
     standard_error: float
@@ -104,7 +104,7 @@ class Optimum(Record):
     statement: str
 
     def identifies(self, k: int) -> bool:
-        """Whether the target identifies factor ``k``; one that is out of reach identifies none."""
+        """Return whether the target identifies factor ``k``; a target that is out of reach identifies none."""
         return self.reached and self.names[k] not in self.unidentified
 
 
@@ -122,8 +122,8 @@ class Compromise(Record):
     misfit: float
     statement: str
     desirability: FloatArray = field(default_factory=lambda: np.zeros(0))
-    """Of each target at the chosen point: 1 at the target, falling straight to 0 at target ± margin (Derringer & Suich
-    1980, doi 10.1080/00224065.1980.11980968, exponent 1); the whole is the geometric mean by weight."""
+    """Desirability of each target at the chosen point: 1 at the target, falling linearly to 0 at target ± margin
+    (Derringer & Suich 1980, doi 10.1080/00224065.1980.11980968, exponent 1); overall, the weighted geometric mean."""
 
 
 def find_optimum(
@@ -159,7 +159,7 @@ def find_optimum(
     points, reachable = nearest_points(fitted, target, coded_reference, coded_scale)
     point, reached = points[0], bool(reachable[0])
     resampled, resampling = bootstrap_coefficients(surface, refits, seed)
-    # A stream of its own: the refits stay the same whether or not the target is uncertain.
+    # A separate random stream: the refits stay the same whether or not the target is uncertain.
     drawn = target + target_standard_error * np.random.default_rng([seed, 1]).standard_normal(refits)
     refinements = REFINEMENTS if k < 4 else CLOUD_REFINEMENTS_4
     cloud, cloud_reached = nearest_points(resampled, drawn, coded_reference, coded_scale, refinements)
@@ -203,7 +203,7 @@ def find_optimum(
 
 
 def find_compromise(models: Sequence[Surface], targets: Sequence[Target], reference: npt.ArrayLike) -> Compromise:
-    """Minimise J over the cube from the 27 points of a 3-level grid (deterministic; L-BFGS-B)."""
+    """Minimise J over the cube, starting from the 27 points of a 3-level grid (deterministic; L-BFGS-B)."""
     region = models[0].region
     k = len(region.names)
     home = region.coded(np.asarray(reference, dtype=float))
@@ -248,7 +248,7 @@ def find_compromise(models: Sequence[Surface], targets: Sequence[Target], refere
 def solution_range(surface: Surface, target: float) -> tuple[FloatArray, FloatArray]:
     """Return the least and greatest coded value of each factor on {model = target}, each of shape (factors,).
 
-    Sampled by axis-parallel lines 2/80 apart (2/30 from four factors on); NaN where the cube holds no such point.
+    Sampled by axis-parallel lines 2/80 apart (2/30 for four or more factors); NaN if the cube contains no such point.
     """
     k = len(surface.names)
     lines = WIDTH_LINES if k < 4 else WIDTH_LINES_4
@@ -333,7 +333,7 @@ def _within_points(surface: Surface, refits: int, generator: np.random.Generator
 
 
 def _residuals(surface: Surface, refits: int, generator: np.random.Generator) -> FloatArray:
-    """Return resampled responses, shape (runs, refits); runs of leverage one carry no residual."""
+    """Return resampled responses, shape (runs, refits); runs of leverage one have no residual."""
     free = surface.leverage < 1 - 1e-9
     scaled = (surface.observed - surface.predicted)[free] / np.sqrt(1 - surface.leverage[free])
     draws = generator.choice(scaled - scaled.mean(), size=(surface.observed.size, refits))

@@ -1,14 +1,14 @@
-"""Pilot: how noisy is one run, which observable shows a change best, and how many replicates does a study need?
+"""Pilot: how noisy is one run, which observable separates changes best, and how many replicates does a study need?
 
 sigma is the standard deviation over seeds at one setting; its interval follows from (n - 1) s^2/sigma^2 ~
 chi^2(n - 1). The spread at different settings is compared by Brown and Forsythe's test. Source: Brown and
 Forsythe 1974, J. Am. Stat. Assoc. 69:364; power as in `doe.analysis.power`.
 
-d' says by how many replicate standard deviations a declared change shifts an observable:
-d' = (mean(changed) - mean(centre))/s, with s the pooled standard deviation of both groups (Cohen's d). It keeps its
-sign, so that the interval of a change that does nothing includes zero; estimators are compared by the mean of |d'|
-over the changes. Intervals resample whole runs, and the same runs for all estimators, because one pile is read by every
-estimator. Source: Cohen 1988, ch. 2; Davison and Hinkley 1997, ch. 5.
+d' is the number of replicate standard deviations by which a declared change shifts an observable:
+d' = (mean(changed) - mean(centre))/s, with s the pooled standard deviation of both groups (Cohen's d). It is signed, so
+that the interval of a change without effect includes zero; estimators are compared by the mean of |d'| over the
+changes. Intervals resample whole runs, the same runs for all estimators, because all estimators read the same piles.
+Source: Cohen 1988, ch. 2; Davison and Hinkley 1997, ch. 5.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from doe.record import Record
 FloatArray = npt.NDArray[np.float64]
 
 BIAS_LIMIT_DEG = 5.0
-"""An estimator that misses the angle of made-up piles by more, however they are filled, is not taken."""
+"""An estimator whose error on synthetic piles exceeds this, however they are filled, is excluded."""
 CLEARLY = 0.95
 """Share of the bootstrap samples in which another estimator must beat the default to replace it."""
 
@@ -52,7 +52,7 @@ class Noise(Record):
 
 @dataclass(frozen=True)
 class EqualVariance(Record):
-    """Brown–Forsythe test of equal spread over settings; f and p are NaN when nothing spreads."""
+    """Brown–Forsythe test of equal spread over settings; f and p are NaN if no setting has any spread."""
 
     f: float
     p: float
@@ -63,8 +63,8 @@ class EqualVariance(Record):
 class Resolution(Record):
     """What `replicates` runs resolve with power 0.8 at level 0.05, unit of the response.
 
-    difference: between two means of that many runs each. main_effect: of a two-level screening with that many
-    runs per row, judged one at a time; main_effect_bonferroni: judged for all factors at once. NaN for one
+    difference: between two means of that many runs each. main_effect: in a two-level screening with that many
+    runs per row, each factor tested by itself; main_effect_bonferroni: all factors tested at once. NaN for one
     replicate.
     """
 
@@ -93,9 +93,9 @@ class Separation(Record):
 class EstimatorChoice(Record):
     """The estimator that the screening reads: the default, unless another one clearly separates the changes better.
 
-    best: the one of the largest mean |d'| of those admitted. share_better: share of bootstrap samples in which `best`
-    beats `default` (1 where the default is excluded, 0 where it is the best itself). mean_d_prime: mean of |d'| per
-    estimator over all changes, in the order of `estimators`. excluded: those whose bias on piles of known angle
+    best: the admitted estimator with the largest mean |d'|. share_better: share of bootstrap samples in which `best`
+    beats `default` (1 if the default is excluded, 0 if it is itself the best). mean_d_prime: mean of |d'| per
+    estimator over all changes, in the order of `estimators`. excluded: estimators whose bias on piles of known angle
     exceeds the limit however the piles are made.
     """
 
@@ -138,7 +138,7 @@ def equal_variance(groups: Mapping[str, npt.ArrayLike]) -> EqualVariance:
 
 
 def resolution(sigma: float, replicates: int, rows: int = 28, factors: int = 24, efficiency: float = 1.0) -> Resolution:
-    """Return what `replicates` runs resolve when one run scatters by `sigma` (`power.smallest_main_effect`)."""
+    """Return what `replicates` runs resolve if one run has the SD `sigma` (see `power.smallest_main_effect`)."""
     return Resolution(
         replicates,
         smallest_difference(sigma, replicates),
@@ -150,7 +150,7 @@ def resolution(sigma: float, replicates: int, rows: int = 28, factors: int = 24,
 def d_prime(centre: FloatArray, changed: FloatArray) -> FloatArray:
     """Return the signed d' of samples along the last axis, shapes (..., n1) and (..., n2) -> (...).
 
-    NaN where neither group spreads.
+    NaN if neither group has any spread.
     """
     n1, n2 = centre.shape[-1], changed.shape[-1]
     squares = (n1 - 1) * centre.var(axis=-1, ddof=1) + (n2 - 1) * changed.var(axis=-1, ddof=1)
@@ -168,15 +168,15 @@ def choose_estimator(
     samples: int = 2000,
     seed: int = 0,
 ) -> EstimatorChoice:
-    """Keep the default estimator unless the one of the largest mean |d'| beats it in 95 % of the bootstrap samples.
+    """Keep the default estimator unless the one with the largest mean |d'| beats it in 95 % of the bootstrap samples.
 
     centre: estimator -> values of the runs at the centre. changed: change -> estimator -> values of the runs
     under it. Every estimator reads the same runs; a run that any of them could not read (NaN) is left out for
-    all. default: the target's own estimator. bias: errors of each estimator on piles of known answer, one for each way
-    to make them; it is excluded only if every one of them exceeds bias_limit.
+    all. default: the target's own estimator. bias: errors of each estimator on piles of known angle, one for each way
+    to make them; an estimator is excluded only if all of its errors exceed bias_limit.
 
-    Raises StatisticsError for a default that is no estimator, differing estimators or run counts, fewer than
-    three runs, or when none is admitted.
+    Raises StatisticsError if the default is not an estimator, estimators or run counts differ, there are fewer than
+    three runs, or no estimator is admitted.
     """
     estimators = tuple(centre)
     if not estimators or not changed:

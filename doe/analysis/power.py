@@ -1,14 +1,14 @@
-"""What a design can see before it is run: power, the smallest effect that is resolved, and the replicates it needs.
+"""What a design can detect, computed before it is run: power, smallest resolved effect, and the replicates needed.
 
 Notation: sigma = standard deviation of one run; SE = standard error of the effect under test; an effect delta
 is tested by t = estimate/SE against Student's t, and under delta that t is noncentral with shift delta/SE.
 Source: Cohen 1988, Statistical Power Analysis, ch. 2; computed by statsmodels.
 
-A factor of three names and more is tested by all t columns of its term together: F = SS/(t s²) is noncentral with
-λ = (delta/SE)². The change delta is that between two names, the others midway, the pattern that is seen least (Cohen
-1988, ch. 8), taken over the two names of which it is; then 1/SE² = |(I - P) v|²/sigma², v the change of 1 at every run
-and P the projection onto the columns of all other terms. With equal numbers of runs SE is the standard error of the
-difference of two means. With t = 1 this is the t test above.
+A factor of three or more names is tested by all t columns of its term together: F = SS/(t s²) is noncentral with
+λ = (delta/SE)². The change delta is the difference between two names with the others midway between them, the pattern
+that is hardest to detect (Cohen 1988, ch. 8), for the pair of names for which this is worst; then
+1/SE² = |(I - P) v|²/sigma², with v a change of 1 at every run and P the projection onto the columns of all other terms.
+With equal numbers of runs SE is the standard error of the difference of two means. With t = 1 this is the t test above.
 
 The change of the response is counted from low to high for a factor and for an interaction (2 b), from the centre to the
 ends for a square (b). Its SE in a design is sigma sqrt([(X'X)^-1]_jj), times two for 2 b.
@@ -40,11 +40,11 @@ MAX_REPLICATES = 100_000
 
 @dataclass(frozen=True)
 class TermPrecision(Record):
-    """Worst term of a kind ("factor", "name", "interaction", "square"); unit of sigma. "name": a factor of three names
-    and more. df_term: columns that the term is tested by together.
+    """Least precise term of a kind ("factor", "name", "interaction", "square"); unit of sigma. "name": a factor of
+    three or more names. df_term: number of columns by which the term is tested together.
 
-    smallest: change that is seen with chance `power_wanted` at p < alpha; all: the same for all terms at once
-    (Bonferroni). power: chance to see `effect`; NaN without one. NaN where no degree of freedom is left for the error.
+    smallest: change that is detected with power `power_wanted` at p < alpha; all: the same for all terms at once
+    (Bonferroni). power: power for `effect`; NaN without one. NaN if no degree of freedom is left for the error.
     """
 
     kind: str
@@ -58,7 +58,7 @@ class TermPrecision(Record):
     df_term: int = 1
 
     def chance(self, change: float) -> float:
-        """Return the chance to see a change of that size at p < 0.05."""
+        """Return the power to detect a change of that size at p < 0.05."""
         return term_power(change, self.standard_error, self.df, self.df_term)
 
 
@@ -71,10 +71,10 @@ def precision(
     alpha: float = 0.05,
     block: npt.NDArray[np.int64] | None = None,
 ) -> tuple[TermPrecision, ...]:
-    """Return what runs at `coded`, shape (runs, factors), tell about each kind of the model's terms.
+    """Return how precisely runs at `coded`, shape (runs, factors), estimate each kind of term of the model.
 
-    terms: as of `doe.analysis.surface.term_names`. sigma: standard deviation of one run, unit of the response.
-    block: in which each run is made, (runs,), from 0; None or empty where there are no blocks.
+    terms: as in `doe.analysis.surface.term_names`. sigma: standard deviation of one run, unit of the response.
+    block: the block of each run, (runs,), from 0; None or empty if there are no blocks.
     Raises StatisticsError for a sigma or an effect that is not positive, or terms that the runs cannot separate.
     """
     _require_noise(sigma, effect)
@@ -115,10 +115,10 @@ def precision_of_names(
     alpha: float = 0.05,
     block: npt.NDArray[np.int64] | None = None,
 ) -> tuple[TermPrecision, ...]:
-    """Return the same where factors are names.
+    """Return the same as `precision` for designs with factors that are names.
 
-    levels: number of names per factor, 0 of a number; coded: of a factor of names the codes of `doe.designs.optimal`.
-    terms: as of `doe.analysis.named_factors.orders_of`. The others, and what is refused, as of `precision`.
+    levels: number of names per factor, 0 for a number; coded: for a factor of names the codes of `doe.designs.optimal`.
+    terms: as in `doe.analysis.named_factors.orders_of`. Other arguments and errors as in `precision`.
     """
     _require_noise(sigma, effect)
     columns = columns_of(levels, terms)
@@ -145,14 +145,14 @@ def precision_of_names(
             df_term=df_term,
         )
         before = worst.get(found.kind, found)
-        # Without a degree of freedom for the error there is no smallest change to compare by.
+        # Without degrees of freedom for the error, there is no smallest change by which to compare.
         poorer = max(before, found, key=lambda one: (np.nan_to_num(one.smallest), one.standard_error))
         worst[found.kind] = replace(poorer, terms=before.terms + (found.kind in worst))
     return tuple(worst[kind] for kind in ("factor", "name", "interaction", "square") if kind in worst)
 
 
 def _with_blocks(terms: FloatArray, block: npt.NDArray[np.int64] | None) -> FloatArray:
-    """The model of `terms`, shape (runs, terms), and blocks; StatisticsError where the runs cannot separate it."""
+    """The model of `terms`, shape (runs, terms), with blocks; StatisticsError if the runs cannot separate them."""
     model = terms
     if block is not None and block.size:
         model = np.column_stack([model, block_columns(block, int(block.max()) + 1)])
@@ -162,7 +162,7 @@ def _with_blocks(terms: FloatArray, block: npt.NDArray[np.int64] | None) -> Floa
 
 
 def _changes(coded: FloatArray, levels: Sequence[int], term: str) -> FloatArray:
-    """Every change of 1 by `term` at the runs, shape (runs, changes), in the pattern that the module names."""
+    """Every change of 1 by `term` at the runs, shape (runs, changes), in the pattern described above."""
     letters = factor_letters(len(levels))
     if term.endswith("^2"):
         return coded[:, [letters.index(term.removesuffix("^2"))]] ** 2
@@ -179,9 +179,9 @@ def _changes(coded: FloatArray, levels: Sequence[int], term: str) -> FloatArray:
 
 
 def term_power(effect: float, standard_error: float, df: float, df_term: int, alpha: float = 0.05) -> float:
-    """Return the chance that the test of a term by `df_term` columns together rejects at level `alpha`.
+    """Return the probability that the test of a term by `df_term` columns together rejects at level `alpha`.
 
-    `effect` and `standard_error` as of the module, of which the noncentral F has the shift (effect/SE)².
+    `effect` and `standard_error` are delta and SE as defined above; the noncentral F has the shift (effect/SE)².
     """
     if df_term == 1:
         return t_test_power(effect, standard_error, df, alpha)
@@ -189,7 +189,7 @@ def term_power(effect: float, standard_error: float, df: float, df_term: int, al
 
 
 def t_test_power(effect: float, standard_error: float, df: float, alpha: float = 0.05) -> float:
-    """Return the chance that a two-sided t test at level `alpha` rejects when the true effect is `effect`.
+    """Return the probability that a two-sided t test at level `alpha` rejects if the true effect is `effect`.
 
     `effect` and `standard_error` share one unit; `df` are the degrees of freedom of the error estimate.
     """
@@ -204,10 +204,10 @@ def t_test_power(effect: float, standard_error: float, df: float, alpha: float =
 def smallest_effect(
     standard_error: float, df: float, alpha: float = 0.05, power: float = 0.8, df_term: int = 1
 ) -> float:
-    """Return the effect that a two-sided t test detects with chance `power`, in the unit of `standard_error`.
+    """Return the effect that a two-sided t test detects with probability `power`, in the unit of `standard_error`.
 
-    df_term: columns that a term is tested by together, by F where there are several (`term_power`). NaN without
-    degrees of freedom; zero when the standard error is zero.
+    df_term: number of columns by which a term is tested together; several are tested by F (`term_power`). NaN without
+    degrees of freedom; zero if the standard error is zero.
     """
     if df < 1 or not math.isfinite(standard_error):
         return math.nan
@@ -241,17 +241,17 @@ def smallest_main_effect(
 
 
 def main_effect_efficiency(design: FloatArray) -> float:
-    """Return the information on the worst known main effect of a design as a share of that in as many rows at ±1.
+    """Return the information on the least precise main effect of a design as a share of that in as many rows at ±1.
 
-    design: coded points, shape (rows, factors). Var(2 b_j) = 4 sigma²/(efficiency x rows) at worst; 1 for orthogonal
-    two-level designs, below it where rows stand in the middle or factors are correlated. Raises StatisticsError where
-    the rows cannot tell the factors apart.
+    design: coded points, shape (rows, factors). At worst Var(2 b_j) = 4 sigma²/(efficiency x rows); 1 for orthogonal
+    two-level designs, less if rows lie in the middle or factors are correlated. Raises StatisticsError if the rows
+    cannot separate the factors.
     """
     model = with_intercept(design)
     if np.linalg.matrix_rank(model) < model.shape[1]:
         raise StatisticsError(f"{len(design)} rows cannot tell {design.shape[1]} factors and the mean apart")
     worst = float(np.diag(np.linalg.inv(model.T @ model))[1:].max())
-    # Rounding of the inverse is no loss: orthogonal designs have 1 exactly.
+    # Rounding of the inverse must not count as a loss: orthogonal designs have exactly 1.
     return round(1.0 / (len(design) * worst), 12)
 
 
@@ -261,8 +261,8 @@ def smallest_linear_effect(
     """Return the change from low to high of one factor, 2 b_i, that a second-order model of `design` resolves.
 
     design: coded points, shape (points, factors), each run `replicates` times. SE = 2 sigma sqrt(v/replicates)
-    with v the largest entry of (X'X)^-1 that belongs to a linear term, for not every design tells all factors alike;
-    the error is the residual of the model.
+    with v the largest diagonal entry of (X'X)^-1 for a linear term, since some designs estimate factors with different
+    precision; the error is the residual of the model.
     """
     model = second_order_terms(design)
     variance = float(np.diag(np.linalg.inv(model.T @ model))[1 : 1 + design.shape[1]].max())
@@ -320,7 +320,7 @@ def replicates_for_linear_effect(
 
 @lru_cache(maxsize=4096)
 def _smallest_shift(df: float, alpha: float, power: float, df_term: int) -> float:
-    """Return the effect in standard errors; the same few are asked for again and again."""
+    """Return the effect in standard errors; cached, as the same few are needed again and again."""
 
     def shortfall(shift: float) -> float:
         return term_power(shift, 1.0, df, df_term, alpha) - power

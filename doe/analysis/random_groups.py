@@ -1,18 +1,20 @@
-"""Groups drawn at random (days, batches, whole plots, seeds): how much do they scatter, and what acts beside that?
+"""Groups drawn at random (days, batches, whole plots, seeds): how much do they scatter, and which terms act besides?
 
 y = X b + u_group + e with u ~ N(0, s_u^2), e ~ N(0, s^2), V = s^2 I + s_u^2 ZZ'. X: the columns of the terms
-(`doe.analysis.named_factors`) and of fixed blocks. A fixed block asks about these groups; a random one about all that
-they were drawn from, and is what a factor is tested against that is constant within a group (a split plot).
+(`doe.analysis.named_factors`) and of fixed blocks. A fixed block concerns these particular groups; a random one
+concerns the population from which they were drawn, and is the error against which a factor is tested that is constant
+within a group (a split plot).
 
-The variances make the restricted likelihood largest (REML, Patterson and Thompson 1971, Biometrika 58:545): with the
-ratio r = s_u^2/s^2 and P = V^-1 - V^-1 X (X'V^-1 X)^-1 X'V^-1, the root of its score in r, s^2 = y'Py s^2/(n - p); in
-balanced data they are those of the expected mean squares, as long as that of the groups is not below zero. Intervals:
-all values with a profile deviance within chi^2(0.95, 1) of the least. Test of s_u = 0: the difference of the deviances
-against an equal mixture of chi^2(0) and chi^2(1) (Self and Liang 1987, J. Am. Stat. Assoc. 82:605).
+The variances maximise the restricted likelihood (REML, Patterson and Thompson 1971, Biometrika 58:545): with the
+ratio r = s_u^2/s^2 and P = V^-1 - V^-1 X (X'V^-1 X)^-1 X'V^-1, r is the root of its score, and s^2 = y'Py s^2/(n - p).
+In balanced data they equal those from the expected mean squares, as long as that of the groups is not negative.
+Intervals: all values with a profile deviance within chi^2(0.95, 1) of the least. Test of s_u = 0: the difference of the
+deviances against an equal mixture of chi^2(0) and chi^2(1) (Self and Liang 1987, J. Am. Stat. Assoc. 82:605).
 
-Terms: F on the generalised least squares estimate. Degrees of freedom of its error by Satterthwaite (1946, Biometrics
-Bull. 2:110), for a contrast c 2 (c'Fc)^2/Var(c'Fc), F = (X'V^-1 X)^-1, the variance by the expected information of
-(s^2, s_u^2); of several columns as Fai and Cornelius 1996 and R's lmerTest. In balanced data these are the exact tests.
+Terms: F test of the generalised least squares estimate. Degrees of freedom of its error by Satterthwaite (1946,
+Biometrics Bull. 2:110): for a contrast c, 2 (c'Fc)^2/Var(c'Fc) with F = (X'V^-1 X)^-1 and the variance from the
+expected information of (s^2, s_u^2); for several columns as in Fai and Cornelius 1996 and R's lmerTest. In balanced
+data these are the exact tests.
 """
 
 from __future__ import annotations
@@ -37,13 +39,13 @@ from doe.record import Record
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 RATIOS = np.geomspace(1e-7, 1e7, 141)
-"""s_u^2/s^2 among which the largest likelihood is looked for, before it is refined."""
+"""Values of s_u^2/s^2 among which the largest likelihood is searched for, before it is refined."""
 DROP = float(stats.chi2.ppf(0.95, 1))
 
 
 @dataclass(frozen=True)
 class Component(Record):
-    """A variance with its 95 % interval, in the squared unit of the response. share: of the sum of both."""
+    """A variance with its 95 % interval, in the squared unit of the response. share: its share of the sum of both."""
 
     name: str
     variance: float
@@ -59,7 +61,7 @@ class Component(Record):
 
 @dataclass(frozen=True)
 class RandomTest(Record):
-    """A term against its own error: F on df and df_error degrees of freedom."""
+    """Test of a term against its own error: F with df and df_error degrees of freedom."""
 
     source: str
     df: int
@@ -70,7 +72,7 @@ class RandomTest(Record):
 
 @dataclass(frozen=True)
 class Estimate(Record):
-    """A coefficient, coded: standard error, degrees of freedom of it, p (is it zero? by t)."""
+    """A coefficient, coded: its standard error with degrees of freedom, and p (t test that it is zero)."""
 
     term: str
     value: float
@@ -83,10 +85,10 @@ class Estimate(Record):
 class RandomFit(Record):
     """A fitted model with groups drawn at random.
 
-    components: "between groups", "within". p_groups: of s_u = 0. deviance: -2 ln of the restricted likelihood with all
-    constants, for the coded columns of sum-to-zero contrasts. effects: of the groups, predicted (shrunk towards zero).
-    coefficients: intercept and terms of one column; means: of the names of factors of names. observed, predicted: per
-    run, without and with the group's effect.
+    components: "between groups", "within". p_groups: test of s_u = 0. deviance: -2 ln of the restricted likelihood with
+    all constants, for the coded columns of sum-to-zero contrasts. effects: predicted effects of the groups (shrunk
+    towards zero). coefficients: intercept and terms of one column; means: for the names of factors of names. observed,
+    predicted: per run, without and with the group's effect.
     """
 
     levels: tuple[tuple[str, ...], ...]
@@ -152,7 +154,7 @@ class _Likelihood:
         return np.asarray(np.diag(self.sizes / (1 + ratio * self.sizes)) - shrunk @ self.solved(ratio)[0] @ shrunk.T)
 
     def best_ratio(self) -> float:
-        """The ratio of the largest likelihood; 0 where no scatter of the groups makes it larger."""
+        """The ratio that maximises the likelihood; 0 if no scatter of the groups increases it."""
         found = [self.profile(ratio) for ratio in RATIOS]
         least = int(np.argmin(found))
         if least in (0, len(RATIOS) - 1) or found[least] >= self.profile(0.0):
@@ -164,7 +166,7 @@ class _Likelihood:
 class _Runs:
     """The valid runs: coded points (n, k), values, row of the design, group of each; columns of fixed blocks.
 
-    levels: number of names per factor, 0 of a number.
+    levels: number of names per factor, 0 for a number.
     """
 
     points: FloatArray
@@ -180,7 +182,7 @@ class _Runs:
         return np.column_stack([columns_of(self.levels, terms).matrix(self.points), self.fixed])
 
     def spare(self, terms: Sequence[str]) -> int:
-        """The fewer of the degrees of freedom between groups and within; -1 where terms cannot be told apart."""
+        """The lesser of the degrees of freedom between and within groups; -1 if the terms cannot be separated."""
         model = self.matrix(terms)
         indicator = (self.group[:, None] == np.arange(len(self.names))).astype(np.float64)
         rank, both = np.linalg.matrix_rank(model), np.linalg.matrix_rank(np.column_stack([model, indicator]))
@@ -197,10 +199,10 @@ def fit_random(
     terms: Sequence[str] = (),
     blocks: Blocks | None = None,
 ) -> RandomFit:
-    """Fit a model to every valid run; groups are drawn at random, blocks are fixed. Others as of `fit_named`.
+    """Fit a model to every valid run; groups are drawn at random, blocks are fixed. Other arguments as in `fit_named`.
 
-    By default the highest order that leaves 3 degrees of freedom, if any does, between the groups and within them.
-    Raises StatisticsError where the runs do not bear the model, or the groups leave no scatter to compare.
+    The default is the highest order that leaves 3 degrees of freedom, if any does, both between and within groups.
+    Raises StatisticsError if the runs do not support the model, or the groups leave no scatter to compare.
     """
     values, row, observed = valid_runs(responses, len(coded))
     fixed = np.zeros((len(row), 0))
@@ -250,7 +252,7 @@ def fit_random(
 
 
 def _terms(runs: _Runs, given: tuple[str, ...] | None, order: Order | None) -> tuple[str, ...]:
-    """The given terms, those of an order, or of the highest that the runs bear; raises StatisticsError for none."""
+    """The given terms, those of an order, or of the highest that the runs support; raises StatisticsError for none."""
     orders = orders_of(runs.levels)
     if given is not None:
         chosen = given
@@ -297,7 +299,7 @@ class _Errors:
         shrunk = likelihood.model_sums / (1 + ratio * likelihood.sizes)[:, None]
         by_between = inverse @ shrunk.T @ shrunk @ inverse
         self.slopes = ((self.covariance - ratio * within * by_between) / within, by_between)
-        if ratio == 0:  # on its bound the variance of the groups is no estimate, and the error is that of all runs
+        if ratio == 0:  # at its bound the variance of the groups is not estimated, and the error is that of all runs
             self.variances = np.diag([2 * within**2 / likelihood.df, 0.0])
             return
         projected = likelihood.projected(ratio)
@@ -319,7 +321,7 @@ class _Errors:
         return value, error, df, 2 * float(stats.t.sf(abs(value) / error, df))
 
     def test(self, source: str, coefficients: FloatArray, own: list[int]) -> RandomTest:
-        """F of several coefficients together."""
+        """F test of several coefficients together."""
         value, axes = np.linalg.eigh(self.covariance[np.ix_(own, own)])
         contrasts = np.zeros((len(own), len(coefficients)))
         contrasts[:, own] = axes.T
@@ -334,7 +336,7 @@ class _Errors:
 
 
 def _interval(likelihood: _Likelihood, within: float, between: float, which: int) -> tuple[float, float]:
-    """Ends of the values of one variance whose deviance, least over the other, is within DROP of the least."""
+    """Ends of the interval of one variance whose deviance, minimised over the other, is within DROP of the least."""
     best, scale = (within, between)[which], within + between
     least = likelihood.deviance(within, between)
 

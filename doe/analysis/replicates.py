@@ -31,7 +31,7 @@ def require_matrix(name: str, values: npt.ArrayLike, rows: int) -> FloatArray:
 
 
 def valid_runs(responses: npt.ArrayLike, rows: int) -> tuple[FloatArray, IntArray, FloatArray]:
-    """Return the responses as of `require_matrix`, and the row and the value of every valid run, row by row."""
+    """Return the responses as in `require_matrix`, and the row and the value of every valid run, row by row."""
     values = require_matrix("responses", responses, rows)
     row, replicate = np.nonzero(~np.isnan(values))
     return values, row, values[row, replicate]
@@ -45,13 +45,13 @@ def row_moments(matrix: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]
     counts = valid.sum(axis=1).astype(np.float64)
     means = np.where(counts > 0, np.where(valid, matrix, 0.0).sum(axis=1) / np.maximum(counts, 1), np.nan)
     deviation = np.where(valid, matrix - np.where(counts > 0, means, 0.0)[:, None], 0.0)
-    # Equal replicates leave rounding dust of the order of eps x value; it must not pass for measured noise.
+    # Equal replicates leave rounding errors of the order of eps x value, which must not count as measured noise.
     dust = 8 * np.finfo(np.float64).eps * np.abs(np.where(valid, matrix, 0.0)).max(axis=1)
     deviation[np.abs(deviation) <= dust[:, None]] = 0.0
     return means, counts, (deviation**2).sum(axis=1)
 
 
 def centred(values: FloatArray) -> FloatArray:
-    """Return `values` minus their mean, shape (n,); exact zeros where they differ by rounding only."""
+    """Return `values` minus their mean, shape (n,); exact zeros if they differ only by rounding."""
     dust = 8 * np.finfo(np.float64).eps * np.abs(values).max()
     return np.zeros_like(values) if np.ptp(values) <= dust else values - values.mean()

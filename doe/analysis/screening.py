@@ -1,4 +1,4 @@
-"""Screening: which factors of a design move the response, judged by two error estimates side by side.
+"""Screening: which factors of a design affect the response, tested against two error estimates side by side.
 
 Model: mean response of row r = intercept + sum_j effect_j/2 x_rj, fitted by least squares to the row means. The
 effect is the change from low to high, in the unit of the response: mean(+) - mean(-) of a two-level design without a
@@ -7,7 +7,7 @@ missing row. Sums of squares are partial (Type III) on the scale of row means: S
 Two errors: (a) what the factors leave unexplained, that is the dummy columns (Plackett and Burman 1946), with
 few degrees of freedom and inflated by aliased interactions; (b) the replicates of each row (pure error).
 Lenth's pseudo standard error (Lenth 1989, Technometrics 31:469), for designs without replicates, is given as a third
-view. Many effects are judged at once, so p values are corrected by Holm's step-down method.
+estimate. Many effects are tested at once, so p values are corrected by Holm's step-down method.
 """
 
 from __future__ import annotations
@@ -66,18 +66,18 @@ class FactorEffect(Record):
     by_replicates: EffectTest | None
 
     def test_by(self, source: ErrorSource) -> EffectTest | None:
-        """Return the test against an error; None where there is none."""
+        """Return the test against an error; None if there is none."""
         return self.by_replicates if source == "replicates" else self.by_dummies
 
 
 @dataclass(frozen=True)
 class ErrorEstimate(Record):
-    """An error and what it can see. Margins and detectable effects are in the unit of the response.
+    """An error estimate and the effects that it can detect. Margins and effects are in the unit of the response.
 
     `sigma` is the standard deviation of a row mean (source "dummies") or of one run (source "replicates");
     `margin` is the |effect| at which p = alpha, `margin_bonferroni` the same for all factors at once;
-    `smallest_detectable_effect` is found with chance 0.8. Unbalanced data give every effect its own standard
-    error; `standard_error` is then the median.
+    `smallest_detectable_effect` is detected with probability 0.8. With unbalanced data every effect has its own
+    standard error; `standard_error` is then the median.
     """
 
     source: ErrorSource
@@ -125,20 +125,20 @@ class Screening(Record):
 
     @property
     def error_source(self) -> ErrorSource | None:
-        """Return which error decides: the replicates where there are any, else the dummies, None without either."""
+        """Return the error that decides: the replicates if there are any, else the dummies; None without either."""
         return None if self.deciding_error is None else self.deciding_error.source
 
     @property
     def deciding_error(self) -> ErrorEstimate | None:
-        """Return the error that decides; None without replicates and dummies."""
+        """Return the estimate of the error that decides; None without replicates or dummies."""
         return self.pure_error or self.dummy_error
 
     def error(self, source: ErrorSource) -> ErrorEstimate | None:
-        """Return the estimate of an error; None where the design gives none."""
+        """Return the estimate of an error; None if the design gives none."""
         return self.pure_error if source == "replicates" else self.dummy_error
 
     def half_width(self, effect: FactorEffect) -> float:
-        """Return half the 95 % interval of `effect`: t limit × its standard error, NaN where it was not tested."""
+        """Return half the 95 % interval of `effect`: t limit × its standard error; NaN if it was not tested."""
         error, test = self.deciding_error, self.deciding_test(effect)
         return math.nan if error is None or test is None else error.t_limit * test.standard_error
 
@@ -166,8 +166,8 @@ class Screening(Record):
     ) -> tuple[str, ...]:
         """Return the factors with p < alpha by falling |t|, against the error that decides unless one is named.
 
-        The default corrects for the number of factors (Holm 1979), so that `alpha` is the chance of any false
-        find; "none" is the paper's way, with one false find expected per 1/alpha factors.
+        The default corrects for the number of factors (Holm 1979), so that `alpha` is the probability of any false
+        positive; "none" is the paper's way, with one false positive expected per 1/alpha factors.
         """
         found = []
         for effect in self.ranked():
@@ -197,7 +197,7 @@ def analyse_screening(
 
     design: levels from -1 to +1, shape (rows, columns). names: one per column. responses: shape (rows, replicates),
     NaN where a run is missing. dummies: the names of columns that carry no factor. Rows without any valid run
-    are left out and named; the factors are then estimated by least squares on the rest, and the dummies are
+    are left out and reported; the factors are then estimated by least squares on the rest, and the dummies are
     no longer estimable.
 
     Raises StatisticsError when shapes or names disagree, levels are beyond -1 … +1 or the rows left cannot
@@ -273,10 +273,10 @@ def select_factors(
 ) -> tuple[Selected, ...]:
     """Return the `n` factors of the next stage, each with its reason.
 
-    Significant factors come first by falling |t|, the largest of all targets (`further`: those beside the first, by
-    name), then `fallback` in its order; `exclude` holds columns that this set-up cannot test, be they given up as
-    dummies here and not in `further`. Raises StatisticsError when both together give fewer than `n`, or a name is no
-    factor.
+    Significant factors come first, by falling |t|, the largest over all targets (`further`: analyses of the further
+    targets by name), then `fallback` in its order. `exclude`: columns that this set-up cannot test, even if they were
+    given up as dummies here and not in `further`. Raises StatisticsError if both together give fewer than `n`, or a
+    name is not a factor.
     """
     known = {effect.name for effect in screening.effects if not effect.is_dummy or effect.name in exclude}
     for name in (*fallback, *exclude):
@@ -340,7 +340,7 @@ def effect_tests(
 ) -> list[EffectTest | None]:
     """Return one test per column; None where the effect or the error is not estimable.
 
-    An error of exactly zero tests nothing: t and p are NaN.
+    With an error of exactly zero nothing can be tested: t and p are NaN.
     """
     if estimate is None:
         return [None] * effects.size
@@ -369,8 +369,8 @@ def holm(p_values: FloatArray) -> FloatArray:
     """Return step-down adjusted p values (Holm 1979, Scand. J. Stat. 6:65), shape of the input; NaN stays
     NaN.
     """
-    # The same numbers as statsmodels' multipletests, which collects garbage at every call: 0.2 s each, several times
-    # for every look at a study that runs.
+    # The same numbers as statsmodels' multipletests, which runs the garbage collector at every call: 0.2 s each,
+    # several times for every update of a running study.
     adjusted = np.full(p_values.shape, np.nan)
     order = [int(i) for i in np.argsort(p_values) if not np.isnan(p_values[i])]
     running = 0.0
@@ -454,7 +454,7 @@ def _require_consistent(design: npt.NDArray[np.number[Any]], names: Sequence[str
 
 
 def _require_estimable(levels: FloatArray, valid: npt.NDArray[np.bool_]) -> None:
-    """Refuse rows that cannot tell the factors apart; levels: the valid rows and factor columns."""
+    """Refuse rows that cannot separate the factors; levels: the valid rows and factor columns."""
     model = with_intercept(levels)
     if np.linalg.matrix_rank(model) < model.shape[1]:
         missing = ", ".join(str(row + 1) for row in np.flatnonzero(~valid))

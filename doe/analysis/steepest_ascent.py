@@ -3,24 +3,24 @@ effects.
 
 In coded units (low = -1, high = +1) the direction of factor i is d_i = effect_i/|effect_base|, with the
 factor of the largest |effect| as base, so that a step moves factor i by d_i x (base step). Because a *target*
-is wanted and no maximum, all steps are run and the pair between which the error changes sign brackets the
+is wanted and not a maximum, all steps are run, and the pair between which the error changes sign brackets the
 target. Source: Box and Wilson 1951, J. R. Stat. Soc. B 13:1; Myers, Montgomery and Anderson-Cook 2016, ch. 5.
 
-Of several targets the walk leads to where all of them are missed least, in the measure by which the optimum is chosen
+With several targets, the walk leads to the point where they are missed least by the criterion that chooses the optimum
 (`optimum.py`), with the first-order models ŷ_t(x) = ȳ_t + b_t·x of the screening, b_t = effects of target t/2:
 
     J(x) = Σ_t w_t (ŷ_t(x) − T_t)²/s_t² + |x|²
 
-s_t² = (standard error of the target)² + (that of ȳ_t)². The least is in closed form,
+s_t² = (standard error of the target)² + (that of ȳ_t)². The minimum has the closed form
 
     x* = (I + Σ_t w_t b_t b_tᵀ/s_t²)⁻¹ Σ_t w_t b_t (T_t − ȳ_t)/s_t²
 
-and the line through the centre and x* is walked. |x|² counts half a range as much as one standard error, so that an
-effect within noise turns the walk little. With one target x* is a multiple of b, so that this is the walk of steepest
-ascent; the gradient of J alone would follow whichever target is known best. Source: least squares damped by Levenberg
-1944, Q. Appl. Math. 2:164, which is ridge analysis (Myers, Montgomery and Anderson-Cook 2016, ch. 6); several responses
-in one measure: ibid. ch. 7; desirability, told beside it: Derringer and Suich 1980, J. Qual. Technol. 12:214,
-doi 10.1080/00224065.1980.11980968.
+and the walk follows the line through the centre and x*. |x|² gives half a range the same weight as one standard error,
+so that an effect within noise hardly turns the walk. With one target, x* is a multiple of b, and this is the walk of
+steepest ascent; the gradient of J alone would follow whichever target is known best. Source: damped least squares,
+Levenberg 1944, Q. Appl. Math. 2:164, which is ridge analysis (Myers, Montgomery and Anderson-Cook 2016, ch. 6); several
+responses in one criterion: ibid. ch. 7; desirability, reported as well: Derringer and Suich 1980, J. Qual. Technol.
+12:214, doi 10.1080/00224065.1980.11980968.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ from doe.record import Record
 FloatArray = npt.NDArray[np.float64]
 
 LEAST_SHARE = 0.25
-"""Half-width of a region, at least, as a share of a factor's range."""
+"""Least half-width of a region, as a share of a factor's range."""
 REACHED = 2.0
-"""Standard errors by which a target may be missed where a path meets it, as in `optimum.py`."""
+"""Standard errors by which a target may be missed and still count as met by a path, as in `optimum.py`."""
 RISE = 3.84
-"""By which the misfit rises along a path out of the 95 % interval of its place: chi-squared, one degree of freedom."""
+"""Rise of the misfit at the ends of the 95 % interval of a place on a path: chi-squared, one degree of freedom."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class AscentPath(Record):
 class Bracket(Record):
     """Where a path meets the target.
 
-    lower, upper: indices of the steps on both sides, equal when the target was not met. position: the
+    lower, upper: indices of the steps on both sides, equal if the target was not met. position: the
     interpolated place of the target, counted in steps. resolved: both ends differ from the target by more
     than 1.96 standard errors (None without standard errors). errors: response - target per step; crossings:
     number of sign changes.
@@ -136,7 +136,7 @@ class Approach(Record):
     resolved: bool
 
     def words(self, names: Sequence[str]) -> str:
-        """Return what was found as sentences; names: of the targets."""
+        """Return the result as sentences; names: of the targets."""
         worst = int(np.argmax(np.abs(self.missed)))
         text = (
             f"All {len(names)} targets together are missed least at step {self.position + 1:.1f}, by at most "
@@ -200,8 +200,9 @@ def joint_path(
     """Return the walk through the centre towards x*, where the first-order models miss their goals least (see above).
 
     low, high: screened ranges, natural units, shape (factors,). The walk is that of `ascent_path` with x* in place of
-    the effects: it comes from the far side and leads on as far as the ranges allow. `predicted` is that of the first
-    model. Raises StatisticsError as `ascent_path`; all goals met at the centre leave no direction.
+    the effects: it comes from the opposite side and continues as far as the ranges allow. `predicted` is that of the
+    first model. Raises StatisticsError like `ascent_path`, also if all goals are met at the centre, which leaves no
+    direction.
     """
     slopes = np.array([model.effects / 2 for model in models])
     precision = np.array([model.weight / model.spread**2 for model in models])
@@ -268,9 +269,9 @@ def approach(
 def bracket(path_means: npt.ArrayLike, target: float, standard_errors: npt.ArrayLike | None = None) -> Bracket:
     """Find the neighbouring steps between which the response passes the target.
 
-    path_means: mean response per step, NaN where no run is valid (such a step is passed over), shape
-    (steps,). standard_errors: of those means, same shape. Of several sign changes the one whose two errors
-    are smallest counts. When there is none the nearest step is returned with a statement. Raises
+    path_means: mean response per step, NaN where no run is valid (such a step is skipped), shape
+    (steps,). standard_errors: of those means, same shape. If there are several sign changes, the one with the
+    smallest two errors is taken; if there is none, the nearest step is returned with a statement. Raises
     StatisticsError without a valid step.
     """
     means = np.asarray(path_means, dtype=np.float64)
@@ -304,7 +305,7 @@ def bracket(path_means: npt.ArrayLike, target: float, standard_errors: npt.Array
 
 
 def region_around(path: AscentPath, found: Bracket | Approach, minimum_share: float = LEAST_SHARE) -> Region:
-    """Return the box of the next design, within the ranges, centred where the path meets the target, or all best.
+    """Return the box of the next design, within the ranges, centred where the path meets the target or best meets all.
 
     The half-width of a factor is one step of the path, but at least `minimum_share` of its range (a factor
     that the path hardly moves would otherwise drown in noise) and at most half of it. A box that would leave

@@ -3,10 +3,10 @@ squares.
 
 Factors are coded, x = (value - centre)/half_width, so that the region is the cube [-1, 1]^k. Term order:
 intercept, linear, products (i < j), squares. p = number of these terms, n = number of valid runs. A model with fewer
-terms keeps this layout, with zeros for what it leaves out. Runs that were made in blocks (days, batches, operators) add
-a fixed effect per block, with the sum zero over the blocks: the intercept, and what the model predicts, is the mean of
-all blocks. Source: Box and Wilson 1951; Myers, Montgomery and Anderson-Cook 2016, Response Surface Methodology, ch. 6
-and 7.6 (blocks).
+terms keeps this layout, with zeros for the terms it omits. Runs made in blocks (days, batches, operators) add a fixed
+effect per block; the effects sum to zero over the blocks, so that the intercept and the predictions refer to the mean
+of all blocks. Source: Box and Wilson 1951; Myers, Montgomery and Anderson-Cook 2016, Response Surface Methodology,
+ch. 6 and 7.6 (blocks).
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ class Surface(Record):
     natural units. included: which terms are in the model, shape (p,); the others have coefficient and variance zero.
     information_inverse: (X'X)^-1, shape (p, p). mse: residual mean square with df_residual
     degrees of freedom. Per run, shape (n,): points (n, k) coded, row_of_run (row of the design), point_of_run
-    (index of the distinct point, within its block), observed, predicted (in its block), leverage. block_names: none
-    where there are no blocks; block_effects of each [unit of the response], block_of_run per run.
+    (index of the distinct point, within its block), observed, predicted (in its block), leverage. block_names: empty
+    if there are no blocks; block_effects: that of each block [unit of the response], block_of_run per run.
     """
 
     region: Region
@@ -95,8 +95,8 @@ class Surface(Record):
     def tolerance_half_width(self, coded: npt.ArrayLike, share: float = 0.95, level: float = 0.95) -> FloatArray:
         """Return half the interval that holds a `share` of all further runs at coded points, with confidence `level`.
 
-        z s sqrt((1 + h) df/chi2), chi2 the quantile 1 - level of df degrees of freedom, h the leverage of the point,
-        whose inverse stands for the number of runs (Howe 1969, J. Am. Stat. Assoc. 64:610; Wallis 1951).
+        z s sqrt((1 + h) df/chi2), with chi2 the 1 - level quantile for df degrees of freedom, and h the leverage of the
+        point, whose inverse acts as the number of runs (Howe 1969, J. Am. Stat. Assoc. 64:610; Wallis 1951).
         """
         error = np.sqrt(self.mse + self.standard_error(coded) ** 2)
         spread = np.sqrt(self.df_residual / stats.chi2.ppf(1 - level, self.df_residual))
@@ -110,7 +110,7 @@ class Surface(Record):
 
 @dataclass(frozen=True)
 class Blocks:
-    """In which block every run was made: of_run, shape as the responses, numbers of `names`."""
+    """The block of every run. of_run: shape of the responses, indices into `names`."""
 
     names: tuple[str, ...]
     of_run: IntArray
@@ -123,11 +123,11 @@ def fit_surface(
     terms: Sequence[str] | None = None,
     blocks: Blocks | None = None,
 ) -> Surface:
-    """Fit the second-order model, or those of its terms that are named, to every valid run.
+    """Fit the second-order model, or only the terms named, to every valid run.
 
     coded: design points, shape (points, k); rows may repeat. responses: shape (points, replicates), NaN where
-    a run is missing. region: names and natural scale of the k factors. terms: names as of `term_names`, all if None;
-    the intercept is always in. blocks: a fixed effect each.
+    a run is missing. region: names and natural scale of the k factors. terms: names as in `term_names`, all if None;
+    the intercept is always included. blocks: each has a fixed effect.
 
     Raises StatisticsError for an unknown term, when shapes disagree, the points left cannot separate the terms, or no
     degree of freedom is left for the error.
@@ -184,7 +184,7 @@ def fit_surface(
 def used_blocks(blocks: Blocks, values: FloatArray) -> tuple[tuple[str, ...], IntArray]:
     """Return the names of the blocks that have a valid run, and each valid run's number among them.
 
-    Raises StatisticsError where there is only one, which is no block.
+    Raises StatisticsError if there is only one, which is no blocking.
     """
     found, number = np.unique(blocks.of_run[~np.isnan(values)], return_inverse=True)
     names = tuple(blocks.names[k] for k in found)
@@ -194,7 +194,7 @@ def used_blocks(blocks: Blocks, values: FloatArray) -> tuple[tuple[str, ...], In
 
 
 def block_columns(block: IntArray, number: int) -> FloatArray:
-    """Return the columns of blocks 0 … number - 2 by effects that sum to zero, shape (n, number - 1): 1 in the block,
+    """Return the columns of blocks 0 … number - 2 in sum-to-zero coding, shape (n, number - 1): 1 in the block,
     -1 in the last one; none for fewer than two blocks.
     """
     if number < 2:
@@ -226,9 +226,9 @@ def with_intercept(levels: FloatArray) -> FloatArray:
 def least_squares(model: FloatArray, observed: FloatArray, weights: FloatArray | None = None) -> Any:
     """Return statsmodels' results of (weighted) least squares on a model matrix, (n, p) with ones first, and n values.
 
-    The first observation is subtracted before, so that a constant response gives exact zeros.
+    The first observation is subtracted beforehand, so that a constant response gives exact zeros.
     """
-    # Imported where it is used: statsmodels takes a second to load, and a page needs none of it.
+    # Imported here because statsmodels takes a second to load, and the page does not need it.
     from statsmodels.regression.linear_model import OLS, WLS
 
     shifted = observed - observed[0]
@@ -238,7 +238,7 @@ def least_squares(model: FloatArray, observed: FloatArray, weights: FloatArray |
 def fitted_coefficients(model: FloatArray, observed: FloatArray) -> FloatArray:
     """Return least-squares coefficients of many responses at once; observed of shape (n, sets) gives (p, sets).
 
-    The first observation is subtracted before and returned to the intercept (the first term) after, so that a
+    The first observation is subtracted beforehand and added back to the intercept (the first term), so that a
     constant response gives exact zeros elsewhere.
     """
     origin = observed[0]

@@ -1,4 +1,4 @@
-"""Analysis of variance of a second-order surface, with the fit statistics that published calibrations print.
+"""Analysis of variance of a second-order surface, with the fit statistics that published calibrations report.
 
 Sums of squares are partial (Type III): SS_j = b_j^2/[(X'X)^-1]_jj. Lack of fit compares the residual between
 distinct points with the replicates within them (pure error). PRESS = sum (e_i/(1 - h_i))^2 leaves out one run
@@ -22,13 +22,13 @@ from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
 FULL = 1 - 1e-9
-"""A leverage above this is one: the run is fitted exactly, and nothing can be said against it."""
+"""A leverage above this counts as one: the run is fitted exactly and cannot be tested."""
 CONSTANT = "The response is the same in every run; there is nothing to fit."
 
 
 @dataclass(frozen=True)
 class AnovaRow(Record):
-    """One source of variation; f and p are NaN where it is tested against nothing."""
+    """One source of variation; f and p are NaN if it is not tested."""
 
     source: str
     sum_of_squares: float
@@ -42,10 +42,10 @@ class AnovaRow(Record):
 class SurfaceAnova(Record):
     """ANOVA table and fit statistics of a surface.
 
-    rows: block where there are any, model (without them), every term, residual, lack of fit, pure error, total. R^2
-    counts what blocks explain as explained. sigma = sqrt(MSE), unit of the response. studentized_residuals: external,
-    shape (runs,). better_than_noise: model p < 0.05 and predicted R^2 > 0; by p alone where a run is indispensable to
-    the fit, for then no R^2 can be predicted (NaN).
+    rows: block if there are any, model (without blocks), every term, residual, lack of fit, pure error, total. R^2
+    includes the variation explained by blocks. sigma = sqrt(MSE), unit of the response. studentized_residuals:
+    external, shape (runs,). better_than_noise: model p < 0.05 and predicted R^2 > 0; by p alone if a run is
+    indispensable to the fit, because predicted R^2 is then undefined (NaN).
     """
 
     rows: tuple[AnovaRow, ...]
@@ -128,7 +128,7 @@ def analyse_surface(surface: Surface) -> SurfaceAnova:
 
 
 def total_sum_of_squares(observed: FloatArray) -> float:
-    """Return the sum of squares about the mean, exactly zero when values differ by rounding only."""
+    """Return the sum of squares about the mean, exactly zero if values differ only by rounding."""
     dust = 8 * np.finfo(np.float64).eps * float(np.abs(observed).max())
     return 0.0 if np.ptp(observed) <= dust else float(((observed - observed.mean()) ** 2).sum())
 
@@ -145,8 +145,8 @@ def tested(source: str, sum_of_squares: float, df: int, error_ms: float, error_d
 
 
 def block_row(observed: FloatArray, block: npt.NDArray[np.int64], total_ss: float) -> tuple[AnovaRow, ...]:
-    """Return the row "block", between the means of the blocks and before all terms; untested, as blocks were not drawn
-    at random (Box, Hunter and Hunter 2005, ch. 4).
+    """Return the row "block", the variation between block means before all terms; it is not tested, because blocks were
+    not drawn at random (Box, Hunter and Hunter 2005, ch. 4).
     """
     counts = np.bincount(block)
     means = np.bincount(block, weights=observed) / counts
@@ -160,7 +160,7 @@ def lack_of_fit(
 ) -> tuple[AnovaRow, ...]:
     """Return the rows "lack_of_fit" and "pure_error" as far as they have degrees of freedom.
 
-    By hand: in exact replicates what is left of them by rounding must not become an error.
+    Computed here rather than by a library, so that rounding in exact replicates does not become an error.
     """
     counts = np.bincount(point_of_run)
     means = np.bincount(point_of_run, weights=observed) / counts
@@ -196,10 +196,9 @@ def _press_by_row(surface: Surface, residuals: FloatArray) -> float:
 
 
 def externally_studentized(influence: Any, mse: float, df: int) -> FloatArray:
-    """Return r_i sqrt((df - 1)/(df - r_i^2)), the residuals by an error that is estimated without run i.
+    """Return r_i sqrt((df - 1)/(df - r_i^2)), the residuals studentised by an error estimated without run i.
 
-    The same as statsmodels' `resid_studentized_external`, which fits the model once per run. NaN where that is not
-    defined.
+    The same as statsmodels' `resid_studentized_external`, which refits the model for every run. NaN where undefined.
     """
     if mse == 0 or df < 2:
         return np.full(influence.nobs, np.nan)

@@ -26,7 +26,7 @@ class Sample(Record):
 
     @staticmethod
     def of(values: npt.ArrayLike) -> Sample:
-        """Return the summary of single values, NaN left out; sd is NaN for one value.
+        """Return the summary of single values, ignoring NaN; sd is NaN for one value.
 
         Raises StatisticsError without a valid value.
         """
@@ -64,7 +64,7 @@ class DifferenceTest(Record):
 
 @dataclass(frozen=True)
 class EquivalenceTest(Record):
-    """Two one-sided tests: p is the larger of both; low, high = (1 - 2 alpha) interval of the difference."""
+    """Two one-sided tests: p is the larger of the two; low, high = (1 - 2 alpha) interval of the difference."""
 
     margin: float
     p: float
@@ -129,7 +129,7 @@ def equivalence_test(difference: DifferenceTest, margin: float, alpha: float = 0
 
 
 def _difference(difference: float, error: float, df: float, level: float) -> DifferenceTest:
-    """Return the t test of a difference; without any spread t, p and the interval are NaN."""
+    """Return the t test of a difference; without any spread, t, p and the interval are NaN."""
     if not error > 0:
         return DifferenceTest(difference, error, df, math.nan, math.nan, level, math.nan, math.nan)
     t = difference / error

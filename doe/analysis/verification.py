@@ -1,9 +1,9 @@
 """Verification: do fresh runs at the optimum agree with the measurement? Difference tests, equivalence and
 error.
 
-A difference that is not significant is no proof of agreement: with few runs nothing is significant. The
-equivalence test (TOST) asks the right question, whether the difference is shown to lie within a margin fixed
-beforehand. The tests themselves are in `doe.analysis.t_tests`.
+A difference that is not significant does not prove agreement: with few runs nothing is significant. The
+equivalence test (TOST) asks the right question: is the difference shown to lie within a margin fixed
+beforehand? The tests themselves are in `doe.analysis.t_tests`.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Verification(Record):
 
     @property
     def deciding(self) -> DifferenceTest | None:
-        """Return the test of the difference: Welch's, or that of one sample where the target has no spread."""
+        """Return the test of the difference: Welch's, or the one-sample test if the target has no spread."""
         return self.welch or self.one_sample
 
 
