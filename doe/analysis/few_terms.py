@@ -112,7 +112,7 @@ def _columns(levels: FloatArray, names: Sequence[str]) -> tuple[FloatArray, list
 
 
 def _with_heredity(size: int, k: int, titles: Sequence[str], names: Sequence[str]) -> list[tuple[int, ...]]:
-    """Groups of `size` columns in which every interaction stands beside one of its factors."""
+    """Groups of `size` columns in which every interaction is accompanied by one of its factors."""
     number = {name: i for i, name in enumerate(names)}
     parents = [set() if at < k else {number[part] for part in title.split("*")} for at, title in enumerate(titles)]
     return [

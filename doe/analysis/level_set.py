@@ -150,7 +150,7 @@ def crossings(
 
 
 def _real_roots(a: FloatArray, b: FloatArray, c: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return both real roots of a x^2 + b x + c, free of cancellation; NaN or infinite where none is."""
+    """Return both real roots of a x^2 + b x + c, free of cancellation; NaN or infinite where there is none."""
     with np.errstate(invalid="ignore", divide="ignore"):
         q = -(b + np.copysign(np.sqrt(b**2 - 4 * a * c), b)) / 2
         return q / a, c / q

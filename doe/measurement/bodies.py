@@ -43,9 +43,9 @@ class BodyQuantity:
     """A quantity that can be measured on single bodies: its unit, its description, and its value for a component.
 
     ``of`` computes the value from a declared component; it is None for quantities that the plate test of the same name
-    simulates. ``relative``: effects are added on the logarithm, so that factors add up. ``loads``: what two effects add
-    to 1 is added, as the loads on a contact are; reductions are multiplied. ``written``: the unit in which the user is
-    asked for the quantity. ``how``: how to measure it; ``usual``: the usual standard error on its scale.
+    simulates. ``relative``: its scale is logarithmic, so that factors add up. ``loads``: what two effects add to 1 is
+    added, as the loads on a contact are; reductions are multiplied. ``written``: the unit in which the user is asked
+    for the quantity. ``how``: how to measure it; ``usual``: the standard error of this on its scale.
     """
 
     unit: str
