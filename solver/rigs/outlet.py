@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 EDGE = 0.99
-"""Share of the half width from which a body counts as reaching the edge: one between upright walls just touches them."""
+"""Share of the half width from which a body reaches the edge: one between upright walls just touches them."""
 CHORD = 0.5**0.5
 """Largest distance of the line from the middle, as a share of the half width."""
 

@@ -78,7 +78,7 @@ Action = Switch | Move
 
 @dataclass(frozen=True)
 class Watch:
-    """Record the free surface at every sample from ``after`` [s] on: |x| up to ``half_width``, y from ``height`` [m]."""
+    """Record the free surface at each sample from ``after`` [s] on: |x| up to ``half_width``, y from ``height`` [m]."""
 
     after: float
     half_width: float

@@ -120,7 +120,7 @@ def landing_together(clump: Clump, depth: float) -> int:
 
 
 def _mass_at(clump: Clump, beyond: npt.NDArray[np.float64]) -> float:
-    """Smallest effective mass [kg] of ``clump`` at ``beyond`` [m] past the centre of any member sphere, across the arm."""
+    """Smallest effective mass [kg] of ``clump`` at ``beyond`` [m] past any sphere's centre, across the lever arm."""
     lever = clump.centres.copy()
     length = np.linalg.norm(lever, axis=1)
     away = np.divide(lever, length[:, None], out=np.tile([1.0, 0.0, 0.0], (len(lever), 1)), where=length[:, None] > 0.0)
