@@ -73,7 +73,7 @@ def slope_angle_deg(x: Array, height: Array, half_width: float) -> float:
 
 
 def time_profile(surface: FreeSurface) -> Array:
-    """Median over time of the height in each column [m], shape (c,); NaN where there is no bed half of the time."""
+    """Median over time of the height in each column [m], shape (c,); NaN if there is no bed for half of the time."""
     known = np.isfinite(surface.height)
     filled = np.where(known, surface.height, -np.inf)
     median = np.median(filled, axis=0)

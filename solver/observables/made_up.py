@@ -73,7 +73,7 @@ def seed_spheres() -> tuple[Array, Array]:
 
 
 def seeds_in_cone(angle_deg: float, n: int, rng: np.random.Generator, reach: float) -> Pile:
-    """``n`` seeds at random places and orientations in a cone that they fill to a solid fraction of 0.45.
+    """``n`` seeds at random places and orientations in a cone of their volume divided by a solid fraction of 0.45.
 
     ``reach`` is the scale at which a body, shrunk about its centre, must lie inside. 0: only its centre, so that
     mass is homogeneous and bodies stick out of the cone; 1: the whole body, so that nothing sticks out and mass

@@ -32,7 +32,7 @@ class Entry(NamedTuple):
 
 
 class Supply:
-    """The bodies of one pour: order, sizes, orientations and places come from one generator, so a seed repeats them."""
+    """The bodies of one pour; the seed determines their order, sizes, orientations and places."""
 
     def __init__(self, scene: Scene, seed: int) -> None:
         self.random = np.random.default_rng(seed)

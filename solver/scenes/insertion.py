@@ -20,7 +20,7 @@ Array = npt.NDArray[np.float64]
 
 PROTOCOLS = ("pour_through", "fill_then_open")
 TRIES = 40
-"""Random places that are tried for one body before it waits for the next moment."""
+"""Number of random places that are tried for one body before it waits for the next moment of decision."""
 
 
 @dataclass(frozen=True)

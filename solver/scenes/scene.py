@@ -237,7 +237,7 @@ def check(scene: Scene) -> None:
 
 
 def _check_gravity(scene: Scene) -> None:
-    """Refuse gravity that does not point downwards or is too large, in a rig."""
+    """In a rig, refuse gravity that does not point downwards or is too large."""
     in_rig = scene.rig.name in RIGS or scene.rig.name in BENCH_RIGS
     if in_rig and not (scene.gravity[2] < 0.0 and math.hypot(*scene.gravity) <= MOST_GRAVITY):
         raise ParameterError(

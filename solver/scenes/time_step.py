@@ -17,8 +17,8 @@ with e = 0.05 … 0.9; in all of them the speed deviates from the exact one by l
 (solver/README.md, *Time step*). The stable step of a central difference decreases with the number of contacts and with
 damping: O'Sullivan & Bray 2004 (doi:10.1108/02644400410519794).
 
-f is ``numerics.rayleigh_fraction``, b ``numerics.impact_fraction``. With f = 1 and b = 2 (leapfrog: ω dt < 2), they
-are the limits of stability. All limits are proportional to the size of a body, so the smallest size that its
+f is ``numerics.rayleigh_fraction``, b ``numerics.impact_fraction``. With f = 1 and b = 2 (leapfrog: ω dt < 2), these
+steps are the limits of stability. All are proportional to the size of a body, so the smallest size that its
 distribution allows is used, whatever the seed draws. An effect that stiffens contacts or dissipates more of an impact
 shortens them.
 """
