@@ -1,8 +1,8 @@
-"""Observables: what is read off a finished run. NumPy and SciPy only, no kernels.
+"""Observables: quantities read from a finished run. NumPy and SciPy only, no kernels.
 
-Scalars stand in the tables of their files and in ``OBSERVABLES`` (``observable.py`` says how to add one); a rig names
-the groups that it gives. The curves are functions of their own: :func:`discharge_curve`, :func:`height_profile` and
-:func:`surface_profile`.
+Each file lists its scalars in a table, and ``OBSERVABLES`` holds all of them (``observable.py`` explains how to add
+one). A rig names the groups of observables that it gives. The curves are separate functions: :func:`discharge_curve`,
+:func:`height_profile` and :func:`surface_profile`.
 """
 
 from __future__ import annotations
@@ -63,8 +63,7 @@ COMPONENT_OBSERVABLES = segregation.OBSERVABLES
 
 
 def observables_in(rig: PourRig) -> tuple[str, ...]:
-    """Names of the scalars that a run in ``rig`` gives; those per component (``<name>.<component>``) are not among
-    them."""
+    """Names of the scalars that a run in ``rig`` gives, without those per component (``<name>.<component>``)."""
     found: list[str] = []
     for one in rig.gives:
         found += [one] if one in OBSERVABLES else [name for name, known in OBSERVABLES.items() if known.group == one]
@@ -85,10 +84,10 @@ def observe(record: Record) -> dict[str, Value]:
 
 
 def observe_pile(pile: Pile, wanted: Iterable[Observable] | None = None) -> dict[str, Value]:
-    """Observables that a pile alone gives (a simulated one or a scan), by name; None: all that there are.
+    """Observables of a pile alone, simulated or scanned, by name; ``wanted`` None: all of them.
 
-    Those per component are left out where there is one component. A pile with a coordinate that is not finite
-    has nothing to measure: every value is NaN.
+    Observables per component are left out if there is only one component. If any coordinate of the pile is not
+    finite, every value is NaN.
     """
     finite = bool(np.isfinite(pile.position).all() and np.isfinite(pile.spheres.centre).all())
     if wanted is None:

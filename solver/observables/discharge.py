@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 ROUNDING = 1e-9
-"""Share of the mass that sums in another order may miss."""
+"""Relative tolerance for sums of the mass that are taken in different orders."""
 
 
 def discharge_curve(record: Record) -> tuple[Array, Array]:
-    """``discharged_mass_kg``: times on the clock above [s], mass below the outlet [kg]; shape (k,) each."""
+    """``discharged_mass_kg``: times on the module's clock [s], mass below the outlet [kg]; shape (k,) each."""
     return record.trace.time - record.gate_opened, record.trace.discharged_mass
 
 
@@ -33,7 +33,7 @@ def time_of_share(share: float, time: Array, discharged_mass: Array, poured_mass
 
     ``time`` [s] and ``discharged_mass`` [kg], shape (k,) each. NaN if it never has.
     """
-    # It keeps rounding of the sum from hiding the last body.
+    # The tolerance keeps rounding of the sum from hiding the last body.
     wanted = (share - ROUNDING) * poured_mass
     reached = np.flatnonzero(discharged_mass >= wanted)
     if reached.size == 0 or not poured_mass > 0.0:
@@ -71,7 +71,7 @@ def residual_mass(record: Record) -> Value:
     if trace.time.size == 0:
         return Value(float("nan"), "kg")
     entered, left = float(trace.entered_mass[-1]), float(trace.entered_mass[-1] - trace.discharged_mass[-1])
-    # The two sums run over the bodies in another order; below a billionth of the mass nothing is left.
+    # The two sums add the bodies in different orders: a difference below a billionth of the mass is rounding.
     return Value(left if abs(left) > ROUNDING * entered else 0.0, "kg")
 
 

@@ -2,8 +2,8 @@
 
 The slopes on either side of the slot are read like the flanks of a pile (``repose.py``): silhouette along +y, then a
 least-squares line through the tops of all columns between 20 % and 80 % of that side's height above the shelf.
-Sources of the test: Roessler et al. 2019, Powder Technology 343:803; the angle that stays above an outlet is also
-known as the angle of drain.
+Source of the test: Roessler et al. 2019, Powder Technology 343:803; the angle of the material that remains above an
+outlet is also called the angle of drain.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 """The free surface y(x) of a flowing bed, as a camera that looks along +y sees it, and the angles read off it.
 
-At one moment the surface is the outline of the bed's silhouette: over every column of pixels the top of its largest
-connected part, so that single bodies in the air do not count. The profile over time is the median of these outlines,
-which is where the time-averaged image of a bed without holes is 50 % grey (Lumay et al. 2012, Powder Technology
+At one moment the surface is the outline of the bed's silhouette: in every column of pixels, the top of its largest
+connected part, so that single bodies in the air do not count. The profile over time is the median of these outlines:
+the line along which the time-averaged image of a bed without holes is 50 % grey (Lumay et al. 2012, Powder Technology
 224:19, for the instrument that measures it this way).
 
-x points to the right, y up, both from the rig's centre. An angle is positive where the bed lies higher at −x; the drum
-turns so that this is the way the material is carried.
+x points to the right, y up, both from the rig's centre. An angle is positive where the bed lies higher at −x, the side
+to which the drum carries the material.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 WINDOWS = 5
-"""Parts of the averaging time whose angles give the spread."""
+"""Number of parts of the averaging time; the spread is that of their angles."""
 CORE = 10.0e-3
 """Half width [m] over which ``slope_core_deg`` is taken."""
 CHORD = 0.6
@@ -73,7 +73,7 @@ def slope_angle_deg(x: Array, height: Array, half_width: float) -> float:
 
 
 def time_profile(surface: FreeSurface) -> Array:
-    """Median over time of the height over each column [m], shape (c,); NaN where half of the time there is no bed."""
+    """Median over time of the height in each column [m], shape (c,); NaN if there is no bed for half of the time."""
     known = np.isfinite(surface.height)
     filled = np.where(known, surface.height, -np.inf)
     median = np.median(filled, axis=0)

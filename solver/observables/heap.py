@@ -1,16 +1,16 @@
-"""Whether what lies on the plate is a heap, of which an angle of repose can be asked, or a flat layer, or a few bodies.
+"""Whether the material on the plate is a heap, which has an angle of repose, or only a flat layer or a few bodies.
 
-The silhouette of any layer slopes at its rim, so that an angle can be fitted to it; it is a property of single grains
-and of where they happen to lie. A heap
+The silhouette of any layer slopes at its rim, so that an angle can be fitted there, but this angle depends on single
+grains and on where they happen to lie. A heap
 
-    is at least ``LEAST_HEIGHT`` grain thicknesses high at its apex, the top that the flanks' windows are shares of, and
+    is at least ``LEAST_HEIGHT`` grain thicknesses high at its apex, the height that the flanks' windows refer to, and
     has the tops of at least ``LEAST_GRAINS`` grains in the window of a flank's line, median over views and flanks.
 
-The thickness is a grain's smallest outer dimension, mean by mass over the pile (``footprint.grain_thickness``): a flat
-grain lies on its broad side, so that two layers are two thicknesses high. Two grains fix a line, whatever else the
-heap does; from the third on there is something to fit. At 2.5 thicknesses the window, from 20 % to 80 % of the height,
-is 1.5 thicknesses high: 3.5 along a slope of 25°, and below 3 from 30° on, so that for equal round grains both limits
-lie close together, and the second one finds what is steep and narrow.
+The thickness is a grain's smallest outer dimension, averaged by mass over the pile (``footprint.grain_thickness``):
+flat grains lie on their broad side, so that two layers are two thicknesses high. Two grains determine a line, whatever
+the rest of the heap looks like; only from the third on is there something to fit. At 2.5 thicknesses the window, from
+20 % to 80 % of the height, is 1.5 thicknesses high, which is 3.5 along a slope of 25° and less than 3 from 30° on. For
+equal round grains the two limits are therefore close together, and the second one rejects what is steep and narrow.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LEAST_GRAINS = 3
 
 
 def why_no_heap(pile: Pile) -> str:
-    """Why ``pile`` is no heap, in words and numbers; empty for a heap. Its coordinates have to be finite."""
+    """The reason why ``pile`` is not a heap, with numbers; empty for a heap. Its coordinates must be finite."""
     reading = PileReading(pile)
     if not reading.is_pile:
         return f"{pile.mass.size or 'no'} body lies still on the plate"
@@ -51,8 +51,9 @@ def why_no_heap(pile: Pile) -> str:
 def told(rig: PourRig, ended: Verdict, pile: Pile) -> Verdict:
     """Outcome and message of a run in ``rig`` that ``ended`` and left ``pile``.
 
-    That of ``ended``, but ``NO_HEAP`` for a pile at rest that is no heap in a rig that is read for one. A pour that is
-    read at a given time (``MEASURED``) is read as it stands then, as the pile was that it is compared with.
+    Both are those of ``ended``, except that a pile at rest that is not a heap, in a rig whose heap is read, is
+    ``NO_HEAP``. A pour that is read at a given time (``MEASURED``) is read as it is then, like the pile that it is
+    compared with.
     """
     outcome, message = ended
     if outcome != Outcome.AT_REST or not rig.leaves_heap:

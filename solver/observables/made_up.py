@@ -1,4 +1,4 @@
-"""Made-up piles whose angle is known beforehand, and the bias of the estimators on them.
+"""Made-up piles of known angle, and the bias of the estimators on them.
 
 Geometry only, no simulation: a homogeneous cone, and seeds at random places and orientations that fill one.
 """
@@ -22,7 +22,7 @@ SEED_AXES = np.array([27.92e-3, 11.18e-3, 6.11e-3])
 MEMBER = 1.0e-3
 """Radius of the spheres that a made-up surface is tiled with [m]."""
 GRID = 0.8e-3
-"""Distance of the tiling spheres [m]; the surface between them is 0.16 mm lower at most."""
+"""Spacing of the tiling spheres [m]; between them the surface is at most 0.16 mm lower."""
 
 
 def pile_of(centre: Array, radius: Array, body: npt.NDArray[np.int32], component: list[int] | None = None) -> Pile:
@@ -73,11 +73,11 @@ def seed_spheres() -> tuple[Array, Array]:
 
 
 def seeds_in_cone(angle_deg: float, n: int, rng: np.random.Generator, reach: float) -> Pile:
-    """``n`` seeds at random places and orientations in a cone of their volume over a solid fraction of 0.45.
+    """``n`` seeds at random places and orientations in a cone of their volume divided by a solid fraction of 0.45.
 
-    ``reach`` says how much of a body, shrunk about its centre, must lie inside. 0: its centre, so that mass
-    is homogeneous and bodies stick out of the cone; 1: all of it, so that nothing sticks out and mass is
-    scarce below the surface. Geometry only: bodies may overlap, and what is below the plate is not seen.
+    ``reach`` is the scale at which a body, shrunk about its centre, must lie inside. 0: only its centre, so that
+    mass is homogeneous and bodies stick out of the cone; 1: the whole body, so that nothing sticks out and mass
+    is scarce below the surface. Geometry only: bodies may overlap, and parts below the plate are not seen.
     """
     solid_fraction = 0.45
     slope = np.tan(np.radians(angle_deg))
@@ -85,7 +85,7 @@ def seeds_in_cone(angle_deg: float, n: int, rng: np.random.Generator, reach: flo
     base = (3 * volume / (np.pi * slope)) ** (1 / 3)
     height = base * slope
     local, radius = seed_spheres()
-    # One member is centred in the seed: where it does not fit, no turn helps.
+    # One member sphere is at the seed's centre: if it does not fit, no orientation does.
     middle = reach * float(radius[~local.any(axis=1)].max())
     found: list[Array] = []
     while len(found) < n:
@@ -111,9 +111,9 @@ def estimator_bias(
 ) -> dict[str, tuple[tuple[float, float], ...]]:
     """Error of each estimator [°] on cones filled with seeds: (mean, standard error) for each of ``REACHES``.
 
-    What "fills the cone" means is open and moves the estimators by up to 20°, so the three readings bound the bias
-    and none of them is the bias. ``piles`` cones of ``bodies`` seeds each. Names that are no angle of repose are left
-    out: a made-up cone says nothing about them.
+    What "fills the cone" means is open and shifts the estimators by up to 20°: the three readings bound the bias, and
+    none of them is the bias. There are ``piles`` cones of ``bodies`` seeds each. Names other than angles of repose are
+    left out, as a made-up cone says nothing about them.
     """
     angles = tuple(name for name in names if name.startswith("angle_of_repose"))
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in angles}
@@ -129,7 +129,7 @@ def estimator_bias(
 def _readings(
     names: tuple[str, ...], angle_deg: float, piles: int, bodies: int, seed: int
 ) -> tuple[tuple[Mapping[str, Value], ...], ...]:
-    """What is read off the cones of `estimator_bias`, for each of ``REACHES``: the same for every study."""
+    """Readings of the cones of `estimator_bias`, for each of ``REACHES``; the same for every study."""
     found = []
     for reach in REACHES:
         rng = np.random.default_rng(seed)

@@ -1,4 +1,4 @@
-"""Observables by the names of measured data: scalars and curves, of a run or of a scanned pile, by the same functions.
+"""Observables by the names used in measured data: scalars and curves, from runs and scanned piles alike.
 
 A scalar is one of ``OBSERVABLES`` or a view ``angle_of_repose_deg@AZ`` from any azimuth. The curves:
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 Readings = dict[str, float | Array]
-"""Value of a scalar, or values of a curve at the places that were asked for, by name."""
+"""Value of a scalar, or values of a curve at the requested places, by name."""
 
 VIEW = re.compile(r"angle_of_repose_deg@(\d+(?:\.\d+)?)")
 
@@ -42,7 +42,7 @@ class Named:
     name: str
     unit: str
     x_unit: str | None
-    """Unit of a curve's places; None: a scalar."""
+    """Unit of a curve's abscissa; None for a scalar."""
     of_pile: bool
     """True if a scanned pile gives it."""
     telltales: tuple[Telltale, ...]
@@ -70,7 +70,7 @@ def named(name: str) -> Named | None:
 
 
 def all_names() -> tuple[str, ...]:
-    """Every name but the views from azimuths beside the listed ones."""
+    """Every name except views from azimuths that are not listed."""
     return (*OBSERVABLES, *(curve.name for curve in CURVES))
 
 
@@ -88,7 +88,7 @@ def observe_named(record: Record, wanted: Mapping[str, Array | None]) -> Reading
 
 
 def observe_scan(scan: Pile, scene: Scene, wanted: Mapping[str, Array | None]) -> Readings:
-    """The same of a scanned pile of the bodies of ``scene``; names that a pile does not give are left out."""
+    """The same for a scanned pile of the bodies of ``scene``; names that a pile does not give are left out."""
     return _of_pile(PileReading(scan), scene, _pile_part(wanted))
 
 

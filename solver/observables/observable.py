@@ -1,9 +1,10 @@
-"""What an observable is: a named scalar with its unit, what it is read off, and what reading it can reveal.
+"""What an observable is: a named scalar with its unit, what it is read from, and what reading it can reveal.
 
 It returns a :class:`Value`, a number with its unit and, where one exists, its spread.
 
-To add one: a function and a line in the table of its file, or an entry point ``observable.NAME`` of a package of one's
-own (``solver/plugins.py``). Every rig that gives its group gives it; page, studies, measured data and reports follow.
+To add one, write a function and a line in the table of its file, or an entry point ``observable.NAME`` in your own
+package (``solver/plugins.py``). Every rig that gives its group then gives it, and the page, studies, measured data and
+reports include it.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ Range = tuple[float, float]
 
 ANY: Range = (-math.inf, math.inf)
 ANGLE: Range = (0.0, 90.0)
-"""Of an angle with the horizontal [°]."""
+"""Range of an angle with the horizontal [°]."""
 TILT: Range = (-90.0, 90.0)
-"""Of an angle whose sign says which way it falls [°]."""
+"""Range of an angle whose sign gives the direction of the slope [°]."""
 SHARE: Range = (0.0, 1.0)
 AT_LEAST_0: Range = (0.0, math.inf)
 
@@ -52,17 +53,17 @@ class Observable:
     function: Callable[..., Value]
     needs: Literal["pile", "record"]
     group: str = ""
-    """Rigs that give this group give it (``rigs/rig.py``); empty: only a rig that names it, or whoever asks for it."""
+    """Rigs that give this group give it (``rigs/rig.py``); empty: only rigs that name it give it, or on request."""
     telltales: tuple[Telltale, ...] = ()
-    """Classes of observables that it belongs to: an effect that none of them reveals stays hidden in it."""
+    """Classes of observables that it belongs to; it does not show an effect that none of them reveals."""
     label: str = ""
-    """As a report writes it; empty: its name with blanks."""
+    """Name in a report; empty: its name with blanks."""
     estimator: bool = False
-    """Whether a study weighs it up, unasked, as the response of its screening: an estimator of the angle of repose."""
+    """Whether a study considers it by default as the response of its screening: an estimator of the angle of repose."""
     scanned: bool = False
-    """Whether it is read, unasked, off a measured scan."""
+    """Whether it is read from a measured scan by default."""
     possible: Range = ANY
-    """Least and largest value that can be measured, ends included, in ``unit``."""
+    """Smallest and largest value that can be measured, ends included, in ``unit``."""
 
     def is_possible(self, value: float) -> bool:
         """Whether ``value``, in ``unit``, can be measured."""
@@ -102,7 +103,7 @@ def of_pile(
     scanned: bool = False,
     possible: Range = ANY,
 ) -> Observable:
-    """An observable that a pile alone gives, a simulated one or a scan; documented by its function's first line."""
+    """An observable of a pile alone, simulated or scanned; documented by the first line of its function's docstring."""
     text = doc or first_line(function)
     return Observable(name, unit, text, function, "pile", group, telltales, label, estimator, scanned, possible)
 
@@ -116,7 +117,7 @@ def of_record(
     scanned: bool = False,
     possible: Range = ANY,
 ) -> Observable:
-    """An observable of a whole run; documented by its function's first line."""
+    """An observable of a whole run; documented by the first line of its function's docstring."""
     return Observable(
         name, unit, first_line(function), function, "record", group, telltales, scanned=scanned, possible=possible
     )

@@ -1,7 +1,7 @@
 """The observables of a pile at rest, each a function PileReading → Value.
 
-The angle of repose is read by the image method (``repose.py``), and as that of the cone that a pile is equivalent to,
-by three estimators that use the whole pile, not its outline. For a homogeneous cone of height H, base radius R and
+The angle of repose is read by the image method (``repose.py``) and, as the angle of an equivalent cone, by three
+estimators that use the whole pile instead of its outline. For a homogeneous cone of height H, base radius R and
 tan(angle) = H/R:
 
     centre of mass          z_com = H/4
@@ -16,16 +16,16 @@ hence
                             min over H, R of ∫ (h(r) - H max(0, 1 - r/R))² r dr
 
 Bias [°] on made-up piles of 80 seed-sized bodies in a cone of 25° (60 piles each, 95 % interval;
-seeds_in_cone in the tests), by how much of a body must lie inside the cone: its centre (homogeneous mass,
-bodies stick out), half of it, all of it:
+seeds_in_cone in the tests), for three rules on how much of a body must lie inside the cone: its centre
+(homogeneous mass, bodies stick out), half of it, all of it:
 
     silhouette flank fit    -5.4 ± 0.6    -1.6 ± 0.5     -0.4 ± 0.4
     cone-equivalent         -8.3 ± 0.8    -1.4 ± 0.6     +4.0 ± 0.5
     centre-of-mass cone     -0.2 ± 0.8   +11.3 ± 0.9    +20.9 ± 0.9
     volume cone            -12.9 ± 0.7    -0.6 ± 1.2    +13.2 ± 1.5
 
-The centre-of-mass cone is right where mass is homogeneous and reads far too steep where the toe is thin;
-none of the three may be compared with an angle that was read from a picture.
+The centre-of-mass cone is right for homogeneous mass and far too steep where the toe is thin. None of the
+three may be compared with an angle that was read from a picture.
 
 Closed forms by integration of H (1 - r/R) over the disc r < R; no source needed.
 """
@@ -58,7 +58,7 @@ SURFACE_RINGS = 60
 
 
 def mass_cone_angle_deg(z_com: float, r50: float) -> float:
-    """Angle [°] of the cone with its centre of mass at ``z_com`` [m], half of its mass within ``r50`` [m]."""
+    """Angle [°] of the cone with its centre of mass at ``z_com`` [m] and half of its mass within ``r50`` [m]."""
     return _degrees(2.0 * z_com, r50)
 
 

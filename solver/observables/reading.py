@@ -1,4 +1,4 @@
-"""A pile with what several observables read from it, each computed once and only when asked for."""
+"""A pile with the intermediate results that several observables use, each computed once and only on demand."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ SURFACE_PIXELS = 160
 
 @dataclass(frozen=True)
 class PileReading:
-    """Views and integrals of one pile. Needs two bodies: below that its angles are NaN."""
+    """Views and integrals of one pile. Its angles are NaN if it has fewer than two bodies."""
 
     pile: Pile
 
     @property
     def is_pile(self) -> bool:
-        """True from two bodies on."""
+        """True for two bodies or more."""
         return self.pile.mass.size >= 2
 
     @cached_property
@@ -52,7 +52,7 @@ class PileReading:
 
     @cached_property
     def flanks_above_one_body_deg(self) -> Array:
-        """The same with the floor of the window above a body that lies flat (its thickness and one pixel)."""
+        """The same with the floor of the window above a body that lies flat (its thickness plus one pixel)."""
         return self._flanks_deg(self.thickness + PIXEL)
 
     def view_deg(self, azimuth_deg: float) -> tuple[float, float]:
@@ -66,7 +66,7 @@ class PileReading:
 
     @cached_property
     def flank_grains(self) -> Array:
-        """Bodies whose tops the line of a flank is fitted through, shape (azimuths, 2); NaN for a flank without one."""
+        """Number of bodies whose tops a flank's line is fitted to, shape (azimuths, 2); NaN for a flank without one."""
         counts = np.full((len(AZIMUTHS_DEG), 2), np.nan)
         if not self.is_pile:
             return counts
@@ -86,7 +86,7 @@ class PileReading:
 
     @cached_property
     def grain_thickness(self) -> float:
-        """The same as a mean over the pile's mass [m]: what the height of a heap is compared with."""
+        """Thickness of a body, averaged by mass over the pile [m]: the scale for the height of a heap."""
         return surface.grain_thickness(self.pile)
 
     @cached_property

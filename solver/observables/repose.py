@@ -8,8 +8,8 @@ for 24 piles of 262 three-sphere bodies: mean difference 0.02°, standard deviat
 outermost point of every row differ from it by 1.1 ± 1.4° (height on position) and 2.7 ± 1.8° (position on
 height).
 
-What the image method fits and what a screen draws of a view, its outline and the two lines, are the same: both come
-from :func:`flank_lines`.
+The outline and the two lines that a screen shows of a view are those that the image method fits: both come from
+:func:`flank_lines`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class FlankLine:
     z: tuple[float, float]
     """Heights of the line there [m]."""
     slope: float
-    """Drop per length outward."""
+    """Drop per unit length outward."""
 
     @property
     def angle_deg(self) -> float:

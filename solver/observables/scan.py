@@ -2,11 +2,11 @@
 
     centre (m, 3) [m], radius (m,) [m], body (m,): which body a sphere belongs to, any whole numbers
 
-Spheres of a body stand in the order of the declared ``sphere_centres`` (any order where the body is symmetric). Its
-centre of mass is that combination of its spheres' centres, with weights that add up to one, which gives the declared
-centre of mass from the declared centres; a rigid motion, and a stretch as well, leave such a combination where it
-belongs. Its mass is the declared one times the cube of its linear size, mean radius over declared mean radius.
-One component: nothing in a scan says of what a body is made.
+The spheres of a body are in the order of the declared ``sphere_centres`` (in any order if the body is symmetric). Its
+centre of mass is a weighted mean of its spheres' centres; the weights, which add up to one, are those that give the
+declared centre of mass from the declared centres, and they remain valid under rigid motion and stretching. Its mass is
+the declared mass times the cube of its relative linear size, the mean radius over the declared mean radius. Only one
+component is allowed, because a scan does not show what a body is made of.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from solver.scenes.scene import Scene
 Array = npt.NDArray[np.float64]
 
 CENTRE_SLACK = 1e-3
-"""By how much of a body's size the combination may miss the declared centre of mass."""
+"""Largest deviation of the weighted mean from the declared centre of mass, as a share of the body's size."""
 
 
 def scanned_pile(scene: Scene, centre: Array, radius: Array, body: npt.NDArray[np.integer]) -> Pile:

@@ -1,8 +1,8 @@
 """Silhouette of a pile: what a camera at plate height sees from far away.
 
 An image is a boolean array, shape (rows, columns): row 0 lies on the plate and rows go up, columns go from
-left to right. Simulated piles and photographs meet here; a photograph, stored from the top down, is flipped
-first.
+left to right. Simulated piles and photographs share this form; a photograph, stored from the top down, is
+flipped first.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class _Strips:
     rows: int
     columns: int
     sphere: npt.NDArray[np.int64]
-    """Index of the sphere that a strip is of, shape (k,)."""
+    """Index of the sphere that a strip belongs to, shape (k,)."""
     column: npt.NDArray[np.int64]
     first: npt.NDArray[np.int64]
     """Lowest covered row, shape (k,)."""
@@ -119,7 +119,7 @@ def largest_part(image: Image) -> Image:
         return image
     from scipy import ndimage  # here: a pour that is cut off has no pile, and this takes 0.3 s to load
 
-    # A silhouette lies in memory column by column; to label it along them takes half as long.
+    # A silhouette is stored column by column; labelling it in that order takes half as long.
     labels, _ = ndimage.label(image.T, structure=EIGHT_NEIGHBOURS)
     pixels = np.bincount(labels.ravel())
     pixels[0] = 0

@@ -27,7 +27,7 @@ class HeightMap:
 
     @staticmethod
     def of(height: Array, pixel: float) -> HeightMap:
-        """That of ``height`` (n, n) [m] in pixels of ``pixel`` [m], about the middle of the grid."""
+        """The map of ``height`` (n, n) [m] in pixels of ``pixel`` [m], about the middle of the grid."""
         axis = (np.arange(len(height)) + 0.5 - len(height) / 2) * pixel
         return HeightMap(height, np.hypot(axis[:, None], axis[None, :]), pixel)
 
@@ -61,7 +61,7 @@ def height_map(spheres: Spheres, centre: Array, half_width: float, pixel: float)
 
 
 def coarsened(surface: HeightMap, times: int) -> HeightMap:
-    """``surface`` in pixels ``times`` as wide: each the mean of what is known of it, NaN where nothing is.
+    """``surface`` in pixels ``times`` as wide: each is the mean of its known heights, NaN where none is known.
 
     The number of pixels along an edge must be a multiple of twice ``times``, so that the centre stays a corner.
     """
@@ -104,7 +104,7 @@ def mass_radii(pile: Pile) -> Array:
 def radius_holding(share: float, radius: Array, mass: Array) -> float:
     """Radius [m] that holds ``share`` of ``mass`` [kg], bodies at ``radius`` [m]; shape (n,) each.
 
-    A body at a radius counts half of its mass as inside; linear between bodies. For equal masses this is
+    Half of a body's mass counts as inside its own radius; linear between bodies. For equal masses this is
     Hazen's quantile (Hyndman & Fan 1996, definition 5). NaN without bodies.
     """
     if mass.size == 0:
@@ -115,7 +115,7 @@ def radius_holding(share: float, radius: Array, mass: Array) -> float:
 
 
 def body_thicknesses(pile: Pile) -> Array:
-    """Smallest extent of each body along its principal axes [m], shape (n,): of the body in its own size.
+    """Smallest extent of each body along its principal axes [m], shape (n,), at the body's own size.
 
     Principal axes of the member spheres' centres; a flat body that lies on the plate is this high.
     """
@@ -142,7 +142,7 @@ def body_thickness(pile: Pile) -> float:
 def grain_thickness(pile: Pile) -> float:
     """Mean of :func:`body_thicknesses` [m], weighted by mass; NaN for an empty pile.
 
-    By mass, because mass fills the pile: by number, the many fines of a mixture would set the scale of a heap of few
-    coarse bodies. Bodies of one mass weigh alike.
+    By mass, because mass fills the pile: by number, the many fines of a mixture would set the scale for a heap of few
+    coarse bodies. Bodies of equal mass count equally.
     """
     return float(np.average(body_thicknesses(pile), weights=pile.mass)) if pile.mass.size else float("nan")

@@ -1,19 +1,19 @@
-"""Numbers that describe the whole top surface of a pile, read off a height map by whoever made it.
+"""Numbers that describe the whole top surface of a pile, read from a height map, whatever its origin.
 
 A simulated pile, a scan and (for the rings alone) a table of heights over the radius are read by the same functions.
-The map is centred on the rig's axis. Where it reaches, and where its rings lie, follows from the charge and the bodies
-before anything is poured (:func:`frame_of`), so that the same number means the same in every pour of a set-up.
+The map is centred on the rig's axis. Its extent and its rings follow from the charge and the bodies before anything is
+poured (:func:`frame_of`), so that a number has the same meaning in every pour of a set-up.
 
     ring_height_<k>_m        mean height of ring k of ``RINGS``                              (needs the rings only)
     ring_volume_m3           volume under the surface within the rings                       (needs the rings only)
-    covered_area_m2          area higher than ``BARE`` of a body's thickness
+    covered_area_m2          area where the height exceeds ``BARE`` of a body's thickness
     height_q90_m, height_q99_m    quantiles of the heights over the covered area
     height_share_<k>         share of the covered area whose height is between edge k and k + 1 of ``EDGES``, in
                              thicknesses of a body; the last share, which the others fix, is left out
     ring_roughness_<k>_m     standard deviation of the heights in a pair of rings about each ring's mean
     slope, curvature_per_m   mean |∇h| and mean |Δh| of the core, r < base radius of the frame
-    skew_x_m, skew_y_m       mean of x and of y over the volume: where the pile leans to
-    inner_skew_x_m …         the same of the core alone
+    skew_x_m, skew_y_m       mean of x and of y over the volume: which way the pile leans
+    inner_skew_x_m …         the same for the core alone
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ ANGLE_DEG, PACKING = 25.0, 0.6
 BARE = 0.25
 """Height below which the plate counts as bare, in thicknesses of a body."""
 EDGES = (BARE, 0.75, 1.0, 1.25, 1.75, 2.25, 3.0, 4.0, 5.0, 6.5, 8.0, math.inf)
-"""Of the classes of heights, in thicknesses: fine where bodies lie singly, for that tells their size."""
+"""Edges of the classes of heights, in thicknesses: fine where bodies lie singly, because that tells their size."""
 PAIRS = RINGS // 2
 
 
@@ -56,7 +56,7 @@ class Frame:
 
     @property
     def half_width(self) -> float:
-        """Of a height map that holds all rings [m]."""
+        """Half width of a height map that holds all rings [m]."""
         return REACH * self.radius
 
     @property
@@ -72,13 +72,13 @@ def frame_of(solid_volume: float, thickness: float) -> Frame:
 
 
 PROFILE_NAMES = (*(f"ring_height_{k + 1}_m" for k in range(RINGS)), "ring_volume_m3")
-"""What rings give."""
+"""Numbers that the rings give."""
 BULK_NAMES = ("covered_area_m2", "height_q90_m", "height_q99_m")
 HISTOGRAM_NAMES = tuple(f"height_share_{k + 1}" for k in range(len(EDGES) - 2))
 TEXTURE_NAMES = (*(f"ring_roughness_{k + 1}_m" for k in range(PAIRS)), "slope", "curvature_per_m")
 ASYMMETRY_NAMES = ("skew_x_m", "skew_y_m", "inner_skew_x_m", "inner_skew_y_m")
 SURFACE_NAMES = (*PROFILE_NAMES, *BULK_NAMES, *HISTOGRAM_NAMES, *TEXTURE_NAMES, *ASYMMETRY_NAMES)
-"""What a height map gives."""
+"""Numbers that a height map gives."""
 
 
 def profile_features(heights: Array, frame: Frame) -> dict[str, float]:
@@ -127,7 +127,8 @@ def surface_features(surface: HeightMap, frame: Frame) -> dict[str, float]:
 def without_holes(surface: HeightMap) -> HeightMap:
     """``surface`` with NaN replaced by the lowest of the nearest known heights along ±x and ±y; 0 where there is none.
 
-    What a scanner does not see lies mostly in the shadow of something higher, and on what stands lowest around it.
+    A place that a scanner does not see is mostly in the shadow of something higher, and level with the lowest
+    surface around it.
     """
     height = surface.height
     missing = np.isnan(height)
@@ -140,7 +141,7 @@ def without_holes(surface: HeightMap) -> HeightMap:
 
 
 def _last_known(height: Array) -> Array:
-    """Of every pixel the last height along the first axis, up to it, that is not NaN; infinite where there is none."""
+    """Last height, up to each pixel along the first axis, that is not NaN; infinite where there is none."""
     rows = np.arange(height.shape[0])[:, None]
     last = np.maximum.accumulate(np.where(np.isnan(height), -1, rows), axis=0)
     known = np.take_along_axis(height, np.maximum(last, 0), axis=0)

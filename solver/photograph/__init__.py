@@ -1,7 +1,7 @@
-"""A photographed pile as one of ours: picture file → silhouette → the outline and flank lines of simulated piles.
+"""A photographed pile read like a simulated one: picture file → silhouette → outline and flank lines.
 
-Beside `solver/observables/scan.py`, which does the same for a scanned pile, and below ``doe``, so that measured data
-sets and the command line read pictures by the same function. NumPy, SciPy and Pillow; no kernels.
+It complements `solver/observables/scan.py`, which does the same for a scanned pile, and lies below ``doe``, so that
+measured data sets and the command line read pictures by the same function. NumPy, SciPy and Pillow; no kernels.
 """
 
 from solver.photograph.checkerboard import Board, board_of

@@ -1,12 +1,12 @@
 """The light on the backdrop, and what stands out from it: masks at a few thresholds, darker and lighter.
 
-The light is a quadratic surface through what surrounds the pile, and the noise about it. It starts from the upper rim
-of the picture, where a whole pile cannot be, and grows downward over every pixel that follows the surface, so that a
-slanting or falling-off light is no threshold's business any more.
+The light is a quadratic surface fitted to what surrounds the pile, with the noise about it. The fit starts from the
+upper rim of the picture, where a whole pile cannot be, and grows downward over every pixel that follows the surface, so
+that the thresholds need not deal with light that slants or falls off.
 
 A picture may hold a pile, a plate and a shadow of different grey. Otsu's threshold (1979) splits what stands out in
-two, and each of the halves in two again; which of these masks, and which of its parts, has the pile's edge is decided
-by how sharp it is.
+two, and each of the halves in two again; the sharpness of the edge decides which of these masks, and which of its
+parts, has the edge of the pile.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ Image = npt.NDArray[np.bool_]
 DOWN_TO = (0.0, 0.0, 0.4, 0.55, 0.7, 0.85, 1.0, 1.0)
 """Share of the rows, from the top, over which the surface is fitted, round by round; 0: the rim alone."""
 FEWEST_LEVELS = 4.0
-"""Grey levels by which backdrop may miss the surface, however little noise there is."""
+"""Grey levels by which the backdrop may deviate from the surface, however little noise there is."""
 NORMAL = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
 LEAST_CONTRAST = 8.0
-"""Grey levels between backdrop and threshold."""
+"""Smallest number of grey levels between backdrop and threshold."""
 LEAST_SIGNAL = 4.0
 """The same in standard deviations of the noise."""
 LEAST_AREA = 0.002
-"""Share of the picture that a pile covers at least."""
+"""Smallest share of the picture that a pile covers."""
 BINS = 256
 CONSTANT = 1e-6
-"""Range of grey levels that is none."""
+"""Range of grey levels below which they count as constant."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ def illumination(grey: Array) -> Illumination:
     scale = np.inf
     for round_, share in enumerate(DOWN_TO):
         residual = np.abs(flat - surface)
-        # The first constant follows no slanting light: every pixel of the rim counts then.
+        # The initial constant cannot follow slanting light: every pixel of the rim counts in the first round.
         chosen = (seen | (rows < share)) & (residual <= max(3.0 * scale, FEWEST_LEVELS))
         k = 3 if round_ == 0 else terms.shape[1]
         coefficients = np.linalg.lstsq(terms[chosen, :k], flat[chosen], rcond=None)[0]
@@ -108,10 +108,10 @@ def thresholds(excess: Array) -> list[float]:
 
 
 def otsu(values: Array) -> float:
-    """The threshold that parts ``values`` with the greatest variance between the parts (Otsu 1979); NaN for a constant,
-    also one that a filter has left with its rounding.
+    """The threshold that divides ``values`` with the greatest variance between the parts (Otsu 1979); NaN for a
+    constant, even one with the rounding of a filter.
 
-    Of thresholds that are equally good the middle one, so that it lies half-way across an empty stretch.
+    Of equally good thresholds it is the middle one, so that it lies half-way across an empty stretch.
     """
     if values.size == 0 or float(np.ptp(values)) < CONSTANT:
         return float("nan")
@@ -139,7 +139,7 @@ def standing_parts(mask: Image) -> list[Image]:
     cut = [(severed(part), part, hangs) for part, hangs in whole]
     # A pile whose apex a funnel touches hangs from the top with it.
     standing = [part if below is None else below for below, part, hangs in cut if below is not None or not hangs]
-    # If only something that reaches the top is left, it is a pile that is cut there.
+    # If all that is left reaches the top, it is a pile that is cut there.
     return standing or [part for part, _ in whole]
 
 

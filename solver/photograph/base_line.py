@@ -1,8 +1,8 @@
 """The line on which the pile stands: the plate's upper edge beside the pile, or the foot of the pile itself.
 
-Lines are y = offset + slope · x in pixels, y down. Where the part that holds the pile ends, on both sides, in a level
-stretch (a plate of the pile's grey), that is the plate; elsewhere the pile's lower boundary is taken. Either is found
-in the mask first and then placed between pixels, where the grey passes half-way between both sides of the edge.
+Lines are y = offset + slope · x in pixels, y down. If the part that holds the pile ends on both sides in a level
+stretch (a plate of the pile's grey), that stretch is the plate; otherwise the pile's lower boundary is used. Either is
+first found in the mask and then placed between pixels, where the grey is half-way between both sides of the edge.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ Kind = Literal["plate", "foot", "given", "support"]
 SHOULDER = 0.04
 """Share of the part's width, at either end, that is level where a plate shows beside the pile."""
 SLOPES = (0.08, 0.2)
-"""Most by which the rise over run of both ends differs, of a plate's and of one that goes on beyond the picture, beside
-the rounding to a pixel over an end."""
+"""Largest difference of rise over run between both ends, for a plate and for one that goes on beyond the picture,
+besides the rounding to a pixel over an end."""
 INNER = 0.10
 """Share of the part's width at either end where the pile is too thin to tell its foot."""
 REACH = 6
@@ -33,7 +33,7 @@ REACH = 6
 MOST_SAG = 0.05
 """Depth of a bulging foot over its width; a round pile seen from 5° above has 0.044, which lowers 25° by 0.5°."""
 UNSEEN_ABOVE_DEG = 3.0
-"""How far above a plate a camera is taken to be at most, where no foot shows it."""
+"""Largest angle at which a camera is assumed to be above the plate, if no foot shows it."""
 MOST_TILT_DEG = 7.0
 BLOCK = 8.0
 
@@ -54,7 +54,7 @@ class BaseLine:
     """x of the outermost columns that it was fitted to [px]."""
     right: float
     above_deg: float = UNSEEN_ABOVE_DEG
-    """How far above the plate the camera may be (95 %), by the foot of the pile; nothing else tells it."""
+    """How far above the plate the camera may be (95 %), from the foot of the pile; nothing else shows it."""
 
     def at(self, x: Array) -> Array:
         """y [px] at ``x`` [px]."""
@@ -67,7 +67,7 @@ class BaseLine:
 
 
 def rough_base_line(part: Image) -> BaseLine:
-    """The base line of a mask's ``part``, to a pixel or so; NotAPile where it has none."""
+    """The base line of a mask's ``part``, to about a pixel; NotAPile if it has none."""
     x, tops, bottoms = _edges(part)
     plate = _shoulders(x, tops, bottoms, bool(part[:, 0].any() and part[:, -1].any()))
     if plate is not None:
@@ -83,7 +83,7 @@ def rough_base_line(part: Image) -> BaseLine:
     try:
         return _foot(x, bottoms)
     except NotAPile as reason:
-        # The rim of a glass that sticks out over the foot makes a bulge of it.
+        # The rim of a glass that sticks out over the foot makes the foot look like a bulge.
         bare = rimless(part)
         if reason.reason != Reason.CAMERA_LOOKS_DOWN or bare is part:
             raise
@@ -116,7 +116,7 @@ def sharp_base_line(grey: Array, rough: BaseLine, scale: float) -> BaseLine:
     found = crossings(*((strip, depth) if rough.kind == "plate" else (strip[::-1], depth[::-1])))
     seen = np.isfinite(found)
     if seen.sum() < 8:
-        # No edge of its own there: the rough line, to a pixel of the mask.
+        # There is no edge there: the rough line is used, to a pixel of the mask.
         return replace(start, slope_error=scale / width, offset_error=scale)
     fitted = _fitted(x[seen], (y[0] - depth[0])[seen] + found[seen], rough.kind, start.left, start.right)
     return replace(fitted, above_deg=rough.above_deg)
@@ -129,7 +129,7 @@ def given_base_line(left: float, right: float, columns: int) -> BaseLine:
 
 
 def check_tilt(line: BaseLine) -> None:
-    """NotAPile where the picture is turned so far that the camera cannot have stood level."""
+    """NotAPile if the picture is turned so far that the camera cannot have been level."""
     if abs(line.tilt_deg) > MOST_TILT_DEG:
         raise NotAPile(
             Reason.TILTED_CAMERA,
@@ -149,7 +149,7 @@ def _edges(part: Image) -> tuple[Array, Array, Array]:
 def _shoulders(x: Array, tops: Array, bottoms: Array, across: bool) -> BaseLine | None:
     """The line through the tops of both ends, if these are level stretches of one line; None otherwise.
 
-    ``across``: they go on beyond both sides of the picture, as a plate does that a lens may bend.
+    ``across``: whether they go on beyond both sides of the picture, like a plate, which a lens may bend.
     """
     n = max(5, round(SHOULDER * x.size))
     if x.size < 6 * n:
@@ -158,7 +158,7 @@ def _shoulders(x: Array, tops: Array, bottoms: Array, across: bool) -> BaseLine 
     slope, offset = np.polyfit(x[ends], tops[ends], 1)
     own = [np.polyfit(x[side], tops[side], 1)[0] for side in (slice(0, n), slice(-n, None))]
     misses = np.abs(tops[ends] - slope * x[ends] - offset)
-    # A level stretch misses by pixel steps and noise; a flank's foot slopes one way on the left, another on the right.
+    # A level stretch deviates by pixel steps and noise; the flanks' feet slope in opposite directions.
     level = (
         np.median(misses) < 1.0 and np.percentile(misses, 90) < 2.5 and abs(own[0] - own[1]) < SLOPES[across] + 0.5 / n
     )
@@ -177,8 +177,8 @@ def _foot(x: Array, bottoms: Array) -> BaseLine:
 
 
 def _above_deg(x: Array, bottoms: Array) -> float:
-    """How far above the plate the camera may be (95 %): a round foot's near half bulges downward by sin of it, over its
-    width twice. NotAPile where it is too far."""
+    """How far above the plate the camera may be (95 %): the near half of a round foot bulges downward by the sine of
+    that angle times half its width. NotAPile if it is too far."""
     u = (x - x.mean()) / (0.5 * max(x[-1] - x[0], 1.0))
     inner = np.abs(u) < 1.0 - INNER
     # Near half of an ellipse: y = line + sag √(1 − u²).
@@ -202,7 +202,7 @@ def _above_deg(x: Array, bottoms: Array) -> float:
 
 
 def _fitted(x: Array, y: Array, kind: Kind, left: float, right: float) -> BaseLine:
-    """Least squares, again without what lies off; of a foot the lower half counts: bodies touch the plate here and
+    """Least squares, repeated without outliers; for a foot the lower half counts, as bodies touch the plate here and
     there and leave gaps above it."""
     keep = np.ones(x.size, dtype=bool)
     slope = offset = 0.0
@@ -216,8 +216,8 @@ def _fitted(x: Array, y: Array, kind: Kind, left: float, right: float) -> BaseLi
             break
     keep = keep if keep.sum() >= 5 else np.ones(x.size, dtype=bool)
     miss = y[keep] - slope * x[keep] - offset
-    # Neighbouring columns miss alike: no more independent ones than the misses change sign, and than there are blocks
-    # of a JPEG.
+    # Neighbouring columns deviate alike: at most as many are independent as the deviations change sign, and as there
+    # are blocks of a JPEG.
     n = max(4, min(keep.sum() / BLOCK, 1 + int(np.count_nonzero(np.diff(np.signbit(miss - miss.mean()))))))
     across = float(np.std(x[keep])) or 1.0
     error = float(np.sqrt(np.mean(miss**2) + 0.1**2) / np.sqrt(n))
@@ -225,7 +225,7 @@ def _fitted(x: Array, y: Array, kind: Kind, left: float, right: float) -> BaseLi
 
 
 def crossings(into: Array, steps: Array) -> Array:
-    """Place among ``steps`` (depths,) where each column of ``into`` is first half-way; NaN where it never is.
+    """Place among ``steps`` (depths,) where each column of ``into`` first passes half-way; NaN where it never does.
 
     ``into`` (depths, columns) are grey levels from outside to inside. The levels of both sides are means over
     neighbouring columns.

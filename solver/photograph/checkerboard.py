@@ -1,10 +1,11 @@
 """How far a lens bends pictures, by the corners of a printed checkerboard that the same camera took.
 
-Where four fields meet the smoothed grey level has a saddle: its second derivatives have fxy² − fxx fyy > 0, largest at
-the corner, whose place between pixels is where both first derivatives vanish (two steps of Newton). From the corner in
-the middle on, each neighbour is looked for where the step from the last one leads, so that every corner gets its row
-and column. A plane board is seen through a straight lens by a homography (eight numbers), and through a bent one with
-k of `lens.py` (Brown 1966, first order, about the middle of the picture) as ninth: least squares over all corners.
+Where four fields meet, the smoothed grey level has a saddle: its second derivatives have fxy² − fxx fyy > 0, largest at
+the corner, whose place between pixels is where both first derivatives vanish (two Newton steps). Starting from the
+corner in the middle, each neighbour is looked for where the step from the last one leads, so that every corner gets its
+row and column. A lens without distortion shows a plane board by a homography (eight numbers); a lens with distortion
+adds k of `lens.py` (Brown 1966, first order, about the middle of the picture) as the ninth. They are fitted by least
+squares over all corners.
 """
 
 from __future__ import annotations
@@ -25,22 +26,24 @@ Array = npt.NDArray[np.float64]
 SEARCHED = 1200
 """Longest side of the picture in which corners are looked for [px]."""
 BLUR = 2.0
-"""Standard deviation of the smoothing [px of that]."""
+"""Standard deviation of the smoothing [px of that picture]."""
 STRONG = 0.25
-"""Of the strength of the last of the strongest ``FEWEST`` corners."""
+"""Smallest strength of a corner, over that of the last of the strongest ``FEWEST`` corners."""
 OPPOSITE, AROUND = 0.5, 5.0
-"""Correlation of the grey levels about a corner with those opposite, and the radius of that ring [px]: of a corner of
-the board itself, where one field is alone, it is negative."""
+"""Smallest correlation of the grey levels around a corner with those opposite, and radius of that ring [px]: at a
+corner of the board itself, where one field is alone, it is negative."""
 APART = 7
-"""Pixels within which a peak is the largest."""
+"""Side of the square in which a peak is the largest [px]."""
 NEAR = 0.3
-"""Of the step between corners, by which the next one may lie off."""
+"""Largest deviation of the next corner from its expected place, over the step between corners."""
 FEWEST = 20
-"""Corners of a grid."""
+"""Smallest number of corners of a grid."""
 LEAST_REACH = 0.5
-"""Of half the diagonal, from the middle of the picture, that the outermost corners reach: the bend grows with r²."""
+"""Smallest distance of the outermost corners from the middle of the picture, over half the diagonal: the bend grows
+with r²."""
 MOST_MISS = 2.0
-"""Pixels by which they may miss their places (root mean square): beyond it the board is not plane, or no board."""
+"""Largest deviation of the corners from their places [px] (root mean square): beyond it the board is not plane, or is
+no board."""
 
 
 @dataclass(frozen=True)
@@ -48,17 +51,17 @@ class Board:
     """What a picture of a checkerboard tells."""
 
     name: str
-    """Of the picture."""
+    """Name of the picture."""
     bend: Bend
     corners: int
     miss: float
-    """Root mean square by which they miss the places of a plane board [px of the picture]."""
+    """Root mean square deviation of the corners from the places of a plane board [px of the picture]."""
     shape: float
     """Columns of the picture over its rows."""
 
 
 def board_of(picture: Picture) -> Board:
-    """The lens by the checkerboard in ``picture``; PhotographError, in one line, where it shows none."""
+    """The lens by the checkerboard in ``picture``; PhotographError, in one line, if it shows none."""
     scale = max(max(picture.grey.shape) / SEARCHED, 1.0)
     grey = reduced_grey(picture.grey, scale)
     places, indices = _grid(_corners(grey))
@@ -120,7 +123,7 @@ def _grid(corners: Array) -> tuple[Array, Array]:
     off = corners - corners[start]
     nearest = np.argsort(np.hypot(*off.T))[1:9]
     first = off[nearest[0]]
-    # The other direction of the grid: of the near ones the nearest that is more across than along.
+    # The other direction of the grid: the nearest of the near corners that is more across than along.
     across = np.abs(first[0] * off[nearest, 1] - first[1] * off[nearest, 0]) / np.hypot(*first)
     steep = across > 0.7 * np.hypot(*off[nearest].T)
     if not steep.any():
@@ -149,8 +152,8 @@ def _grid(corners: Array) -> tuple[Array, Array]:
 
 
 def _fitted(places: Array, indices: Array) -> tuple[float, float, float]:
-    """k, its standard error, and the root mean square by which the corners at ``places`` (from the middle, over half
-    the diagonal) miss; ``indices``: their columns and rows on the board."""
+    """k, its standard error, and the root mean square deviation of the corners at ``places`` (from the middle, over
+    half the diagonal); ``indices``: their columns and rows on the board."""
     middle, size = indices.mean(axis=0), float(np.abs(indices - indices.mean(axis=0)).max())
     board = (indices - middle) / size
 

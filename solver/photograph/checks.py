@@ -1,4 +1,4 @@
-"""Is it a pile, one pile, whole, and clearly seen? Each check ends the reading by its reason or lets it pass."""
+"""Is it a pile, one pile, whole, and clearly seen? Each check either ends the reading with a reason or lets it pass."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.bool_]
 
 LEAST_HEIGHT = 12.0
-"""Pixels of the picture."""
+"""Smallest height of a pile [pixels of the picture]."""
 SECOND_HEAP = 0.35
-"""A second heap is at least so high, over the first."""
+"""Smallest height of a second heap, over that of the first."""
 VALLEY, VALLEY_DEPTH = 0.08, 0.25
-"""A valley between two heaps takes so much from the outline, over its area, and is so deep, over the lower top."""
+"""Smallest area of a valley between two heaps, over that of the outline, and smallest depth, over the lower top."""
 SECOND_AREA = 0.10
 STEEPEST_DEG, FLATTEST_DEG = 75.0, 2.0
 LEAST_EDGE = 6.0
-"""Grey levels between both sides of the edge."""
+"""Smallest number of grey levels between both sides of the edge."""
 WIDEST_EDGE = 0.25
 FAINT = 0.3
-"""Contrast of the edge where it is faintest, over the usual one."""
+"""Smallest contrast of the edge where it is faintest, over the usual contrast."""
 MOST_BELOW = 0.1
-"""Of the height, by which the flanks may go on below the base line."""
+"""Share of the height by which the flanks may go on below the base line."""
 MOST_BEND_DEG = 4.0
-"""Standard deviation of the slopes of the thirds of a flank beyond that of bodies."""
+"""Largest standard deviation of the slopes of the thirds of a flank, beyond that by the bodies."""
 DRAWN_NOISE, DRAWN_SHARE, DRAWN_MISS = 0.05, 0.995, 0.45
 """A drawing: grey levels of noise, share of one grey level on either side, pixels by which the flanks miss a line."""
 MOST_ROUGHNESS = 0.30
@@ -52,7 +52,7 @@ def check_alone(part: Image, others: Sequence[Image], line: BaseLine) -> None:
 
 
 def check_uncut(part: Image, line: BaseLine) -> None:
-    """NotAPile where the pile goes on beyond the frame: above its base line it may not touch it."""
+    """NotAPile if the pile goes on beyond the frame: above its base line it must not touch the frame."""
     height = _height(part, line)
     columns = part.shape[1]
     margin = 0.08 * height
@@ -80,7 +80,7 @@ def check_one_heap(tops: Array) -> None:
 
 
 def check_size(height: float) -> None:
-    """NotAPile for a pile of ``height`` [pixels of the picture] of which nothing can be read."""
+    """NotAPile for a pile of ``height`` [pixels of the picture] that is too small to be read."""
     if height < LEAST_HEIGHT:
         raise NotAPile(
             Reason.TOO_SMALL, f"the pile is {height:.0f} pixels high; at least {LEAST_HEIGHT:g} are needed; go nearer"
@@ -88,7 +88,7 @@ def check_size(height: float) -> None:
 
 
 def check_edge(contrast: float, faintest: float, noise: float) -> None:
-    """NotAPile where both sides of the flanks differ by ``contrast`` grey levels only, or by ``faintest`` somewhere."""
+    """NotAPile if both sides of the flanks differ by only ``contrast`` grey levels, or somewhere by ``faintest``."""
     if faintest < FAINT * contrast:
         raise NotAPile(
             Reason.NO_CLEAR_SILHOUETTE,
@@ -104,7 +104,7 @@ def check_edge(contrast: float, faintest: float, noise: float) -> None:
 
 
 def check_sharp(width: float, height: float) -> None:
-    """NotAPile where the grey levels take ``width`` to change sides on a pile of ``height`` (the same unit)."""
+    """NotAPile if the grey levels change over too large a ``width`` at the edge of a pile of ``height`` (same unit)."""
     if width > WIDEST_EDGE * height:
         raise NotAPile(
             Reason.NO_CLEAR_SILHOUETTE,
@@ -147,7 +147,7 @@ def check_below(share: float) -> None:
 
 
 def check_bend(thirds_deg: Sequence[Sequence[float]], bend_deg: Sequence[float]) -> None:
-    """NotAPile where a flank's thirds (left, right; each from below) differ by more than bodies and a natural bend."""
+    """NotAPile if a flank's thirds (left, right; each from below) differ by more than bodies and a natural bend."""
     for side, thirds, bend in zip(("left", "right"), thirds_deg, bend_deg, strict=True):
         if bend > MOST_BEND_DEG:
             lower, middle, upper = thirds
@@ -167,7 +167,7 @@ def check_bend(thirds_deg: Sequence[Sequence[float]], bend_deg: Sequence[float])
 def check_photographed(noise: float, inside: Array, outside: Array, roughness: float) -> None:
     """NotAPile for a drawing: two flat tones with no noise at all, and flanks (``roughness`` [px]) straight to a pixel.
 
-    A photograph has noise, and one that was made black and white has the outline of bodies.
+    A photograph has noise, and one that was made black and white still has the outline of bodies.
     """
     flat = all(
         one.size > 0 and np.unique(one, return_counts=True)[1].max() >= DRAWN_SHARE * one.size
@@ -182,7 +182,7 @@ def check_photographed(noise: float, inside: Array, outside: Array, roughness: f
 
 
 def check_levels(shift_deg: float) -> None:
-    """NotAPile where a flank that is there at one threshold cannot be read at the next (``shift_deg`` infinite)."""
+    """NotAPile if a flank that is found at one threshold cannot be read at the next (``shift_deg`` infinite)."""
     if not np.isfinite(shift_deg):
         raise NotAPile(
             Reason.NO_CLEAR_SILHOUETTE,
@@ -191,6 +191,6 @@ def check_levels(shift_deg: float) -> None:
 
 
 def _height(part: Image, line: BaseLine) -> float:
-    """Of the highest pixel above the line [pixels of the mask]."""
+    """Height of the highest pixel above the line [pixels of the mask]."""
     columns = np.flatnonzero(part.any(axis=0))
     return float((line.at(columns.astype(float)) - part.argmax(axis=0)[columns]).max())

@@ -22,7 +22,7 @@ Array = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
 
 IN_FRONT = 0.04
-"""Of the width of a pile: its foot lies by so much before a plate's edge behind it."""
+"""Share of a pile's width by which its foot lies below a plate's edge that is behind it."""
 ROUGH = 600
 """Longest side of the reduced picture [px]."""
 
@@ -39,9 +39,9 @@ class Found:
 
 
 def find_pile(grey: npt.NDArray[np.float32], given: BaseLine | None) -> tuple[Found, float]:
-    """The pile in ``grey``, roughly, and how many of its pixels lie along one of the masks'; NotAPile without a pile.
+    """The pile in ``grey``, roughly, and how many of its pixels lie along one of the mask; NotAPile without a pile.
 
-    ``given``: the base line, where it is known.
+    ``given``: the base line, if it is known.
     """
     scale = max(max(grey.shape) / ROUGH, 1.0)
     small = reduced_grey(grey, scale)
@@ -58,7 +58,7 @@ def find_pile(grey: npt.NDArray[np.float32], given: BaseLine | None) -> tuple[Fo
 def _clearest(small: Array, light: Illumination, found: Sequence[Candidate], given: BaseLine | None) -> Found:
     """The candidate with the sharpest flanks among those that stand.
 
-    NotAPile where none does, by the reason of the largest, and wherever a foot shows that it is seen from above.
+    NotAPile if none does, with the reason of the largest, and whenever a foot shows that it is seen from above.
     """
     reasons: list[tuple[Bool, NotAPile]] = []
     standing: list[Found] = []
@@ -87,7 +87,7 @@ def _clearest(small: Array, light: Illumination, found: Sequence[Candidate], giv
 
 
 def _in_front(part: Bool, best: Found) -> bool:
-    """Whether the foot of ``part`` lies before the plate's edge on which the ``best`` part seems to stand."""
+    """Whether the foot of ``part`` lies in front of the plate's edge on which the ``best`` part seems to stand."""
     columns = np.flatnonzero(part.any(axis=0))
     lowest = part.shape[0] - 1 - part[::-1].argmax(axis=0)[columns]
     below = lowest - best.line.at(columns.astype(np.float64))

@@ -3,9 +3,9 @@
     grey levels → the drum's circle → darker and lighter part of its inside → the lower one is the bed
         → its top over the middle of the drum → line over the middle half, as in `observables/free_surface.py`
 
-The camera looks along the axis, or the rim is an ellipse, which is refused; and it is level, of which the picture tells
-nothing: a camera that is turned about the axis by 1° turns the angle by 1°. A picture is one moment, or the time that
-it was exposed.
+The camera must look along the axis; otherwise the rim is an ellipse, which is refused. It must also be level, which the
+picture does not show: a camera that is turned about the axis by 1° turns the angle by 1°. A picture shows one moment,
+or the time of its exposure.
 """
 
 from __future__ import annotations
@@ -31,55 +31,56 @@ Image = npt.NDArray[np.bool_]
 CIRCLE_SIDE = 360
 """Longest side of the picture in which the circle is looked for [px]."""
 RADII = (0.15, 0.75)
-"""Of the drum, over the shorter side of the picture."""
+"""Smallest and largest radius of the drum, over the shorter side of the picture."""
 EDGE_SHARE = 0.15
-"""Of the pixels of a picture, those with the steepest grey may be the drum's edge."""
+"""Share of the pixels of a picture, those with the steepest grey, that may be the drum's edge."""
 SECTORS = 72
-"""Of a circle, in which an edge is looked for."""
+"""Number of sectors of a circle in which an edge is looked for."""
 SEEN = 0.6
-"""Share of them in which a drum has one at least."""
+"""Smallest share of the sectors in which a drum has an edge."""
 CLEAR = 0.75
-"""Share of the sectors with an edge, over that of the clearest circle, from which on another one is clear."""
+"""Share of the sectors with an edge, over that of the clearest circle, from which another circle is clear."""
 CANDIDATES = 24
 NEAR = 0.06
 """Share of the radius about the rough circle at which the rim is looked for in the picture itself, from which on."""
 FAINT = 0.2
-"""Of the steepest edge of a sector: a fainter one is grain."""
+"""Share of the steepest edge of a sector below which an edge is that of a grain."""
 SEEN_INNER = 0.5
-"""Of the sectors, in which the inner edge of a rim is seen at least."""
+"""Smallest share of the sectors in which the inner edge of a rim is seen."""
 EDGE = 0.004
-"""Share of the radius by which the edge of a sector lies off the rim."""
+"""Share of the radius by which the edge of a sector may lie off the rim."""
 BIG_GAP = 0.03
-"""Share by which the radii of two circles differ at least."""
+"""Smallest relative difference between the radii of two circles."""
 CONCENTRIC = 0.06
 """Share of the radius by which the middles of a drum's circles may differ."""
 BOTH_TONES = 0.1
-"""Share of a ring that each tone covers at least where the bed goes on into it."""
+"""Smallest share of a ring that each tone covers if the bed goes on into it."""
 ASLANT = 0.008
-"""Share of the radius by which the rim may be an ellipse; an axis 7° off makes as much."""
+"""Share of the radius by which the rim may be an ellipse; an axis that is 7° off makes as much."""
 OUTSIDE = 0.01
 """Share of the radius by which the circle may lie outside the picture."""
 RIM = 0.95
-"""Of the radius: beyond it the wall is seen, or its shadow."""
+"""Share of the radius beyond which the wall is seen, or its shadow."""
 TEXTURE = 1.0 / 40.0
-"""Of the radius: width of the smoothing that leaves the bed's tone of its grains' light and dark."""
+"""Width of the smoothing, over the radius, that averages the light and dark of grains to the tone of the bed."""
 COLUMNS = 400
-"""Columns that the middle of the drum is resampled to."""
+"""Number of columns that the middle of the drum is resampled to."""
 LEAST_STEPS = 12.0
-"""Grey levels between bed and background."""
+"""Smallest number of grey levels between bed and background."""
 FILLED = (0.03, 0.9)
-"""Share of the drum's face that a bed covers."""
+"""Smallest and largest share of the drum's face that a bed covers."""
 WINDOW = 0.5
 """Half width over the radius in which the angle is read, that of the solver's ``dynamic_angle_deg``."""
 LEAST_WINDOW = 0.6
-"""Share of the window's columns that the surface has to be seen over."""
+"""Smallest share of the window's columns in which the surface has to be seen."""
 STRAIGHT = 0.12
-"""Root mean square distance of the surface from its line, over the radius, beyond which it is no bed's."""
+"""Root mean square distance of the surface from its line, over the radius, beyond which it is not that of a bed."""
 CROSSED = 0.08
-"""Share of what lies below the topmost place of the bed's tone, column by column, that may be of the other tone: 0 of
-beds; 0.12 and more where a bar, a spoke or a reflection crosses the drum."""
+"""Share of the area below the topmost place of the bed's tone, column by column, that may be of the other tone: 0 for
+beds; 0.12 and more if a bar, a spoke or a reflection crosses the drum."""
 WIDEST = 0.12
-"""Of the radius, over which the grey changes from the bed to the background at most: slanting light changes slower."""
+"""Largest width, over the radius, of the change of grey from the bed to the background: slanting light changes more
+slowly."""
 LEAST_ANGLE, MOST_ERROR = 1.0, 2.0
 """Angle [°] below which a drum does not turn, or what was read is no bed's surface; and greatest standard error [°]."""
 
@@ -101,17 +102,17 @@ class PhotographedDrum:
     angle_deg: float
     """Of the line through the surface over the middle half of the drum, to the horizontal of the picture."""
     error_deg: float
-    """Standard error: of the line by the surface's roughness, of where between bed and background the edge is, and of
-    an axis that the camera does not look along."""
+    """Standard error: of the line by the surface's roughness, of the place of the edge between bed and background, and
+    of an axis that the camera does not look along."""
     carried: Literal["left", "right"]
-    """The side on which the bed lies higher: to which the drum carries it up."""
+    """The side on which the bed lies higher, to which the drum carries it up."""
     circle: Circle
     filled: float
     """Share of the drum's face that the bed covers."""
     x: Array
     """Places over the radius, over the middle of the drum; the side on which the bed lies higher is at x < 0."""
     height: Array
-    """Of the surface over the radius, from the drum's centre; NaN where it is not seen. Shape of ``x``."""
+    """Height of the surface over the radius, from the drum's centre; NaN where it is not seen. Shape of ``x``."""
     contrast: float
     """Grey levels between bed and background, of 255."""
 
@@ -170,9 +171,9 @@ def _circle(grey: Array) -> tuple[float, float, float, float]:
     """Middle and radius [px of ``grey``] of the circle that the bed ends at, and how far it is an ellipse.
 
     Every steep pixel votes for the circles through it whose middle lies along its gradient (Duda & Hart 1972, doi
-    10.1145/361237.361242, with the direction of the gradient as Kimme, Ballard & Sklansky 1975 take it). Of the clear
-    ones the largest is the drum, or its outer edge; of those about the same middle it is the innermost one that
-    the bed does not go on beyond.
+    10.1145/361237.361242, with the direction of the gradient as Kimme, Ballard & Sklansky 1975 use it). The largest of
+    the clear circles is the drum, or its outer edge; of the circles about the same middle the drum is the innermost
+    one beyond which the bed does not go on.
     """
     scale = max(max(grey.shape) / CIRCLE_SIDE, 1.0)
     small = reduced_grey(grey.astype(np.float32), scale)
@@ -263,8 +264,8 @@ def _refined(edge: Array, x: float, y: float, radius: float) -> tuple[float, flo
 def _on_the_edge(grey: Array, x: float, y: float, radius: float) -> tuple[float, float, float, float]:
     """The inner edge of the rim near a circle: middle and radius, and by what share of that it is an ellipse.
 
-    From a few radii on, the steep edge of every sector that is nearest to the rim so far is taken, and the rim put
-    through these, outliers weighing little: within the bed grains have edges too, and a rim has two.
+    Starting from a few radii, the steep edge of every sector that is nearest to the rim so far is taken, and the rim is
+    fitted to these, with little weight on outliers: within the bed grains have edges too, and a rim has two.
     """
     azimuth = np.linspace(-np.pi, np.pi, 4 * SECTORS, endpoint=False)
     out = np.arange((1.0 - 2.0 * NEAR) * radius, (1.0 + 2.0 * NEAR) * radius, 0.5)
@@ -289,7 +290,7 @@ def _on_the_edge(grey: Array, x: float, y: float, radius: float) -> tuple[float,
             rim = least_squares(off, rim, loss="cauchy", f_scale=size, x_scale=scale, args=(at,)).x
         found.append((int(np.count_nonzero(np.abs(off(rim, at)) < size)), rim))
     rim = max(found, key=lambda one: one[0])[1]
-    # A rim has two edges of one shape; where the bed has its tone the inner one is seen above the bed only.
+    # A rim has two edges of one shape; if the bed has its tone, the inner one is seen only above the bed.
     beyond = np.where(peak, off(rim, out[1:-1, None]).T, np.inf)
     for inward in np.arange(-2.0 * NEAR * radius, -2.0 * size, 0.5 * size):
         if np.count_nonzero((np.abs(beyond - inward) < size).any(axis=1)) > SEEN_INNER * len(azimuth):
@@ -314,10 +315,10 @@ def _check_circle(grey: Array, x: float, y: float, radius: float, ellipse: float
 
 
 def _bed(grey: Array, x: float, y: float, radius: float) -> tuple[Image, float, float]:
-    """The bed's pixels roughly, in the shape of ``grey``; grey levels to the background; share of the face."""
+    """Rough pixels of the bed, in the shape of ``grey``; its grey levels to the background; its share of the face."""
     rows, columns = np.mgrid[: grey.shape[0], : grey.shape[1]]
     face = np.hypot(columns - x, rows - y) < RIM * radius
-    # Of the face alone: what lies beyond the rim is nobody's tone.
+    # Of the face alone: the tone beyond the rim is neither that of the bed nor of the background.
     weight = ndimage.gaussian_filter(face.astype(np.float64), TEXTURE * radius)
     smooth = ndimage.gaussian_filter(np.where(face, grey, 0.0), TEXTURE * radius) / np.maximum(weight, 1e-6)
     threshold = otsu(smooth[face])
@@ -367,14 +368,14 @@ def _middle(grey: Array, bed: Image, x: float, y: float, radius: float) -> tuple
 
 
 def _surface(image: Image, places: Array, pixel: float) -> Array:
-    """Heights of the surface from the drum's centre at ``places``; NaN where the bed ends at the wall. All over the
-    radius, so is the side of a ``pixel``."""
+    """Heights of the surface from the drum's centre at ``places``; NaN where the bed ends at the wall. All lengths are
+    over the radius, including the side of a ``pixel``."""
     tops: Array = column_tops(image).astype(np.float64) * pixel - 1.0
     return np.where(np.hypot(places, tops) < RIM - 2.0 * pixel, tops, np.nan)
 
 
 def _check_surface(x: Array, height: Array) -> None:
-    """Refuse what is not seen over the middle half of the drum, or not even."""
+    """Refuse a surface that is not seen over the middle half of the drum, or is not even."""
     window = np.abs(x) <= WINDOW
     known = window & np.isfinite(height)
     if np.count_nonzero(known) < LEAST_WINDOW * np.count_nonzero(window):
@@ -385,10 +386,11 @@ def _check_surface(x: Array, height: Array) -> None:
 
 
 def _line_error_deg(x: Array, height: Array) -> float:
-    """Standard error of the angle of the line through the middle half [°], by how rough the surface is.
+    """Standard error of the angle of the line through the middle half [°], from the roughness of the surface.
 
-    A flowing bed is bent like an S by itself: its roughness is what is left of a cubic. Neighbouring columns are of one
-    grain, so that fewer are independent than there are columns, by the sum of the autocorrelation up to its first zero.
+    The surface of a flowing bed is S-shaped: its roughness is the residual of a cubic fit. Neighbouring columns show
+    the same grain, so that there are fewer independent values than columns, by the sum of the autocorrelation up to its
+    first zero.
     """
     known = (np.abs(x) <= WINDOW) & np.isfinite(height)
     x, height = x[known], height[known]

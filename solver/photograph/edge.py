@@ -1,8 +1,8 @@
 """The pile upright on its base line, and its silhouette at the place where grey is half-way between both sides.
 
-The rough part of a mask says within a few pixels where the edge is. There the mean grey just inside and just outside
-are taken along the edge, and a pixel belongs to the pile where it is nearer to the inside (regions of local extent as
-in Lankton & Tannenbaum 2008, here without a moving contour). A shadow or a slanting light changes both means alike and
+The rough part of a mask shows within a few pixels where the edge is. There the mean grey levels just inside and just
+outside are taken along the edge, and a pixel belongs to the pile if it is nearer to the inside (regions of local extent
+as in Lankton & Tannenbaum 2008, here without a moving contour). A shadow or slanting light changes both means alike and
 the half-way place little; noise and the texture of bodies cancel in the means.
 
 How well the edge shows: its contrast, the noise, the width of the change, and how rough the outline is.
@@ -27,11 +27,11 @@ Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.bool_]
 
 COLUMNS = 1000
-"""Columns that a pile is resampled to where the picture has fewer."""
+"""Number of columns that a pile is resampled to if the picture has fewer."""
 FOOT = 0.03
 """Share of the height above which the width of the pile is looked for."""
 LEAST_COLUMNS = 5.0
-"""Pixels of the mask that a pile is wide."""
+"""Smallest width of a pile [pixels of the mask]."""
 MARGIN = 0.1
 """Share of that width that is resampled on either side of it."""
 BAND = 2.5
@@ -39,18 +39,19 @@ BAND = 2.5
 NEIGHBOURHOOD = 0.06
 """Side of the square, over the width of the patch, in which the means of both sides are taken."""
 LEVELS = (0.35, 0.5, 0.65)
-"""Where between outside (0) and inside (1) the edge is put: the middle one counts, the others show how sharp it is."""
+"""Levels between outside (0) and inside (1) at which the edge is placed: the middle one counts, the others show how
+sharp it is."""
 BELOW = (0.04, 0.09, 0.14, 0.19, 0.24)
-"""Shares of the height below the base line between which the flanks are looked for there."""
+"""Depths below the base line, over the height, between which continuing flanks are looked for."""
 BESIDE = 5.0
-"""Pixels on either side of them."""
+"""Width of the strips on either side of a continuing flank [px]."""
 LEAST_STRETCH = 4
 SURE_BELOW, LEAST_BELOW = 4.0, 4.0
-"""Standard errors, and grey levels, by which the grey changes sides where a flank goes on."""
+"""Smallest change of the grey across a continuing flank, in standard errors and in grey levels."""
 NEAR_TOP = 0.95
-"""Of the height, above which a pile is round."""
+"""Share of the height above which a pile is round."""
 SPAN = 0.06
-"""Share of the height, over which the change of the grey across the edge is taken."""
+"""Share of the height over which the change of the grey across the edge is taken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +90,7 @@ class Silhouettes:
 def upright(grey: Array, part: Image, line: BaseLine, scale: float) -> Patch:
     """``grey`` about the ``part`` of a mask that has 1/``scale`` of its resolution, above the base ``line``.
 
-    NotAPile where next to nothing is there.
+    NotAPile if almost nothing is there.
     """
     rows, columns = np.nonzero(part)
     # In the picture's own pixels: along the line, and up from it.
@@ -126,7 +127,7 @@ def silhouettes(patch: Patch, noise: float) -> Silhouettes:
     depth = ndimage.distance_transform_edt(np.pad(patch.rough, ((1, 0), (0, 0)), mode="edge"))[1:]
     distance = np.where(patch.rough, depth, -ndimage.distance_transform_edt(~patch.rough))
     side = max(5, round(NEIGHBOURHOOD * patch.grey.shape[1]))
-    # Beyond the blur of the edge; that of the foot as well, or a thin foot seems paler than it is.
+    # Beyond the blur of the edge, and of the foot as well, or a thin foot would seem paler than it is.
     within = ndimage.distance_transform_edt(np.pad(patch.rough, ((1, 0), (0, 0))))[1:]
     inside = _mean_where(patch.grey, (within > patch.band) & (within < side), side)
     outside = _mean_where(patch.grey, (distance < -patch.band) & (distance > -side), side)
@@ -152,8 +153,8 @@ def both_sides(patch: Patch) -> tuple[Array, Array]:
 
 def pixel_noise(grey: Array) -> float:
     """Standard deviation of a pixel of ``grey``, from second differences along the rows, which slanting light does not
-    touch: median, so that edges and the pile do not count. Over one pixel and over eight, the block of a JPEG, within
-    which its noise is smoothed away."""
+    affect, and their median, so that edges and the pile do not count. Over one pixel and over eight, the block of a
+    JPEG, within which its noise is smoothed away."""
     found = []
     for k in (1, 8):
         second = grey[:, k:-k] - 0.5 * (grey[:, : -2 * k] + grey[:, 2 * k :])
@@ -169,8 +170,8 @@ def edge_contrast(patch: Patch, seen: Silhouettes, tops: Array) -> float:
 
 
 def faintest(patch: Patch, seen: Silhouettes, tops: Array) -> float:
-    """The same at its faintest stretch, a twentieth of the pile wide, over the window of the fit: above it may
-    have been a funnel's tip."""
+    """The same at its faintest stretch, a twentieth of the pile wide, within the window of the fit, as a funnel's tip
+    may have been above it."""
     columns = np.flatnonzero((tops >= FLOOR * tops.max()) & (tops <= CEILING * tops.max()))
     share = max(3, columns.size // 20)
     faint = []
@@ -179,18 +180,18 @@ def faintest(patch: Patch, seen: Silhouettes, tops: Array) -> float:
             continue
         rows = np.clip(tops[side].astype(np.int64) - 1, 0, patch.grey.shape[0] - 1)
         contrast = np.abs(seen.inside - seen.outside)[rows, side]
-        # At its very end the side of a pile may be a drop: the levels there are of what stands before and behind it.
+        # The end of a pile's side may be a steep drop: the levels there are those of what is in front and behind.
         faint.append(float(ndimage.median_filter(contrast, share, mode="nearest").min()))
     return min(faint, default=0.0)
 
 
 def goes_on_below(grey: Array, patch: Patch, flanks: tuple[FlankLine, FlankLine], height: float) -> float:
     """How far the flanks of a pile of ``height`` [pixels of the patch] go on below the base line, over the height; 0
-    where they end there.
+    if they end there.
 
-    Along the lines that go on from the ``flanks`` the grey just inside is compared with that just outside, both
-    as means over stretches: where it changes in the same sense on both of them the pile goes on, as it does on a plate
-    that is seen from above and begins behind it.
+    Along the lines that continue the ``flanks``, the grey just inside is compared with that just outside, both as means
+    over stretches. If it changes in the same sense on both lines the pile goes on, as it does on a plate that is seen
+    from above and begins behind it.
     """
     width = BESIDE / patch.step
     reach = 0.0
@@ -226,8 +227,8 @@ def edge_width(patch: Patch, tops: Array, difference: float) -> float:
     """Pixels of the patch over which the grey changes sides along the flanks: the ``difference`` between the middle of
     the pile and the backdrop, over the steepest change of the grey across the edge.
 
-    The grey is averaged along the flanks at equal distance from the outline, and its change taken over ``SPAN`` of the
-    height: the outline follows the noise of a hazy edge, which looks like a step there.
+    The grey is averaged along the flanks at equal distance from the outline, and its change is taken over ``SPAN`` of
+    the height, because the outline follows the noise of a hazy edge, which then looks like a step.
     """
     columns = _flank_columns(tops)
     span = max(1, round(SPAN * float(tops.max())))
@@ -256,8 +257,8 @@ def _blur(noise: float, contrast: float, step: float) -> float:
 
 
 def _mean_where(values: Array, where: Image, side: int) -> Array:
-    """Mean of ``values`` over a square of ``side`` where ``where`` holds; over all of ``where`` if it holds nowhere
-    near."""
+    """Mean of ``values`` over a square of ``side`` where ``where`` holds; over all of ``where`` if it does not hold
+    nearby."""
     weight = ndimage.uniform_filter(where.astype(np.float64), side, mode="nearest")
     total = ndimage.uniform_filter(np.where(where, values, 0.0), side, mode="nearest")
     overall = float(values[where].mean()) if where.any() else float(values.mean())

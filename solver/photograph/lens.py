@@ -1,9 +1,9 @@
-"""How far a lens bends the picture, by the base line, which is straight; and the picture without that bend.
+"""Distortion of the picture by the lens, found from the base line, which is straight; and the picture without it.
 
 Radial distortion of the first order (Brown 1966): a place at the distance r from the middle of the picture is seen at
 r (1 + k r²), r over half the diagonal; k < 0 is a barrel, k > 0 a pincushion. A straight line that passes the middle
-at the distance a bows by a k r², so that k is the better known the farther the base line is from the middle and the
-longer it shows; one through the middle stays straight in any lens.
+at the distance a bows by a k r², so that k is known better the farther the base line is from the middle and the longer
+it shows; a line through the middle stays straight with any lens.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.bool_]
 
 UNSEEN = 0.02
-"""Standard deviation of k where the base line does not tell it."""
+"""Standard deviation of k if the base line does not tell it."""
 SURE = 5.0
-"""Standard errors from which k is taken out of the picture."""
+"""Number of standard errors from which k is taken out of the picture."""
 LEAST = 0.008
-"""k from which on it is."""
+"""Smallest k that is taken out of the picture."""
 MOST = 0.25
-"""k beyond which it is no lens that bends the base line."""
+"""k beyond which it is not a lens that bends the base line."""
 STEEP = 0.12
 """Rise over run of the plate's edge at which the pile begins."""
 INNER = 0.10
-"""Share of a foot at either end where the pile is too thin to tell it."""
+"""Share of a foot at either end where the pile is too thin to show it."""
 BLOCK = 8.0
 
 
@@ -45,7 +45,7 @@ class Bend:
 
     @property
     def sure(self) -> bool:
-        """Whether it is to be taken out of the picture."""
+        """Whether the bend is to be taken out of the picture."""
         return LEAST <= abs(self.k) <= MOST and abs(self.k) >= SURE * self.error
 
     @property
@@ -58,7 +58,7 @@ UNKNOWN = Bend(0.0, float("inf"))
 
 
 def straight(x: Array, y: Array, k: float) -> tuple[Array, Array]:
-    """Places without the bend of a lens, of places as seen; both from the middle, over half the diagonal."""
+    """Places without the bend of a lens, from places as seen; both from the middle, over half the diagonal."""
     share = np.ones_like(x)
     for _ in range(50):
         share = 1.0 / (1.0 + k * (x * x + y * y) * share * share)
@@ -164,7 +164,7 @@ def _fitted(x: Array, y: Array, half: float, foot: bool) -> Bend:
     n = max(4.0, min(keep.sum() / BLOCK, 1.0 + int(np.count_nonzero(np.diff(np.signbit(miss))))))
     error = float(np.sqrt(np.mean(miss**2) + (0.1 / half) ** 2) / np.sqrt(n) / max(float(np.std(alone)), 1e-12))
     if foot and _round(x[keep], y[keep]) < float(np.std(miss)):
-        # As round as a foot that is seen from above: which of both it is stays open.
+        # As round as a foot that is seen from above: which of the two it is remains open.
         error = max(error, abs(k))
     return Bend(k, error)
 

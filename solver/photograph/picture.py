@@ -26,12 +26,12 @@ MOST_PIXELS = 60_000_000
 MOST_BYTES = 150_000_000
 LEAST_SIDE = 32
 LONGEST = 2400
-"""Longest side [px] that is worked on: an angle gains nothing from more."""
+"""Longest side [px] of the grey levels used: more would not improve an angle."""
 WHITE = 255.0
 FILM_DIAGONAL = math.hypot(36.0, 24.0)
-"""Of a frame of 35 mm film [mm]."""
+"""Diagonal of a frame of 35 mm film [mm]."""
 MOST_FOCAL = 5000
-"""A longer one is no focal length [mm]."""
+"""Longest plausible focal length [mm]."""
 
 
 class PhotographError(ValueError):
@@ -46,12 +46,12 @@ class Picture:
     grey: Grey
     """0 … 255, shape (rows, columns), row 0 on top."""
     width: int
-    """Of the picture itself [px]."""
+    """Width of the picture itself [px]."""
     height: int
     reduced: int
     """Pixels of the picture along a side of one of ``grey``."""
     focal: float | None = None
-    """Focal length [px of the picture], where the file tells that of 35 mm film with the same diagonal."""
+    """Focal length [px of the picture], if the file gives that of 35 mm film with the same diagonal."""
 
     def place(self, index: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Coordinates in the picture of coordinates in ``grey`` (middles of pixels at whole numbers)."""
@@ -63,7 +63,7 @@ class Picture:
 
 
 class Reason(StrEnum):
-    """What a picture lacks."""
+    """Why a picture gives no reading."""
 
     BLANK = "blank"
     NO_CLEAR_SILHOUETTE = "no clear silhouette"
@@ -87,14 +87,14 @@ class Refusal:
     """A picture that gives no reading."""
 
     name: str
-    """Of the picture."""
+    """Name of the picture."""
     reason: Reason
     detail: str
     """One sentence: what was seen, and what would help."""
 
 
 class NotAPile(Exception):
-    """Ends the reading of a picture of a pile or of a drum, whose reader makes it a :class:`Refusal`."""
+    """Ends the reading of a picture of a pile or of a drum; the reader turns it into a :class:`Refusal`."""
 
     def __init__(self, reason: Reason, detail: str) -> None:
         super().__init__(f"{reason}: {detail}")
@@ -149,7 +149,7 @@ def _grey(image: Image.Image, path: Path) -> Grey:
         levels = np.array(image, dtype=np.float32)
         if not np.isfinite(levels).all():
             raise PhotographError(f"{path}: a grey level is not finite")
-        # Sixteen bits have a known white; levels of any other range are stretched over theirs.
+        # Sixteen bits have a known white; other levels are stretched over their own range.
         low, high = (0.0, 65535.0) if image.mode.startswith("I;16") else (float(levels.min()), float(levels.max()))
         return (levels - low) * np.float32(WHITE / max(high - low, 1e-9))
     if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:

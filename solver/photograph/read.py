@@ -1,10 +1,10 @@
 """A photograph of a pile → its outline and flank lines, by the function that reads simulated piles.
 
     grey levels → light of the backdrop → masks and their parts → base line → the picture without the lens's bend →
-    upright silhouette, above what has the pile's tone under it → flank lines, and by thirds
+    upright silhouette, above any support of the pile's tone → flank lines, and by thirds
 
 The picture is one view along the plate, by a camera that is far away, level and no higher than the plate. Lengths are
-in metres where the scale of the picture is known, in its pixels elsewhere.
+in metres if the scale of the picture is known, otherwise in its pixels.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ Array = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
 
 MOST_SUPPORTS = 3
-"""Bodies under each other: a disc on a plate on a table."""
+"""Largest number of bodies under each other: a disc on a plate on a table."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +69,9 @@ class PhotographedPile:
     noise: float
     """Standard deviation of a pixel, in grey levels."""
     size: tuple[int, int]
-    """Of the picture [px]: columns, rows."""
+    """Size of the picture [px]: columns, rows."""
     lens: float = 0.0
-    """k of the lens that was taken out of the picture (`lens.py`), on whose straight copy all lines are; 0: none."""
+    """k of the lens that was taken out of the picture (`lens.py`); all lines are on the straight copy. 0: none."""
 
     @property
     def flanks(self) -> tuple[FlankLine, FlankLine]:
@@ -105,9 +105,9 @@ def read_photograph(
 ) -> PhotographedPile | Refusal:
     """The pile in ``picture``, or why there is none.
 
-    ``metres_per_pixel``: of the picture itself. ``base_line``: y [px of the picture] of the plate at its left and its
-    right edge; found by itself if None. ``bend``: of the lens, where a checkerboard told it (`checkerboard.py`); the
-    base line tells it if None.
+    ``metres_per_pixel``: scale of the picture itself. ``base_line``: y [px of the picture] of the plate at the left and
+    the right edge of the picture; None: found automatically. ``bend``: that of the lens, if a checkerboard showed it
+    (`checkerboard.py`); None: found from the base line.
     """
     try:
         if bend is None:
@@ -207,8 +207,8 @@ def _measured(
 def _standing(
     grey: Array, found: Found, line: BaseLine, scale: float, noise: float
 ) -> tuple[Patch, Silhouettes, Array, BaseLine]:
-    """The pile upright on ``line``, or on the top of what stands on it in the pile's tone, with its silhouettes and its
-    heights per column."""
+    """The pile upright on ``line``, or on the top of a support of the pile's tone that stands on it, with its
+    silhouettes and its heights per column."""
     for _ in range(MOST_SUPPORTS):
         patch = upright(grey, found.candidate.part, line, scale)
         seen = silhouettes(patch, noise)
@@ -227,7 +227,7 @@ def _standing(
 
 
 def _on(under: Support, patch: Patch) -> BaseLine:
-    """The top of what is ``under`` the pile, as its base line."""
+    """The top of the support ``under`` the pile, as its base line."""
     ends = np.array([under.left, under.right])
     z = under.height + under.slope * ends
     x, y = patch.place(ends, z)
@@ -246,7 +246,7 @@ def _on(under: Support, patch: Patch) -> BaseLine:
 def _lens_deg(
     grey: Array, patch: Patch, tops: Array, flanks: tuple[FlankLine, FlankLine], k_error: float
 ) -> tuple[float, float]:
-    """By how much a lens of ``k_error`` turns the flank lines against the base line [°]."""
+    """Angle by which a lens of ``k_error`` turns the flank lines against the base line [°]."""
 
     def angles(k: float) -> Array:
         found = []

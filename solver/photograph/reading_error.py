@@ -1,4 +1,4 @@
-"""How well a picture fixes the angle of the silhouette that it shows: standard errors, and intervals of ±2 of them.
+"""How well a picture determines the angle of the silhouette that it shows: standard errors, and intervals of ±2 errors.
 
 Four sources of reading the silhouette, taken as independent:
 
@@ -22,7 +22,7 @@ camera   a cone of angle α looks like tan² α' = tan² α cos² e - sin² e fr
          e is up to what the foot of the pile allows, or UNSEEN_ABOVE_DEG; θ is known from the focal length in the file,
          and up to UNSEEN_NEAR elsewhere. Anything up to there is as likely: standard deviation 1/√3 of it
 
-What they do not hold: another pour, a wrong base line, a camera farther above the plate or nearer than that.
+What they do not include: another pour, a wrong base line, a camera farther above the plate or nearer than that.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ ROUNDING = 12.0**-0.5
 EDGE = 2.0
 """Width over which the grey levels change sides [pixel]."""
 BLOCK = 8.0
-"""Width over which places of the edge may hang together: a block of a JPEG [pixel]."""
+"""Width over which places of the edge may be correlated: a block of a JPEG [pixel]."""
 LEAST_DEG = 0.02
 THIRDS = (0.2, 0.4, 0.6, 0.8)
 """Ends of the thirds of the window, over the height."""
@@ -59,11 +59,11 @@ CORNERS = tuple(np.linspace(0.08, 0.92, 15))
 SURE_BEND = 3.0
 """χ²/2 with two degrees of freedom at 95 %."""
 COARSE_DEG = 2.0
-"""Scatter of the thirds from which on a few large bodies make them, and they tell nothing of a bend,"""
+"""Scatter of the thirds above which a few large bodies determine them, so that they tell nothing about a bend."""
 COARSE_SPREAD = 6.0
-"""unless they differ by so many times that: those of bodies do by up to 4."""
+"""Multiple of that scatter by which they must differ to tell of a bend all the same: bodies make up to 4."""
 UNSEEN_NEAR = 0.1
-"""Half the width of the pile over the distance of the camera, where nothing tells it: five widths."""
+"""Half the width of the pile over the distance of the camera, if nothing shows it: five widths."""
 
 
 @dataclass(frozen=True)
@@ -80,14 +80,14 @@ class Angle:
 
     @property
     def interval_deg(self) -> tuple[float, float]:
-        """About 95 %."""
+        """Angle ± ``COVERAGE`` standard errors [°]: about 95 %."""
         reach = COVERAGE * self.error_deg
         return self.value_deg - reach, self.value_deg + reach
 
 
 @dataclass(frozen=True)
 class Angles:
-    """Of the left and the right flank, and their mean."""
+    """Angles of the left and the right flank, and their mean."""
 
     left: Angle
     right: Angle
@@ -138,7 +138,7 @@ def angles_of(
         for of in (
             (value[0], thirds[0], each[0], flank[0], lens[0], camera[0]),
             (value[1], thirds[1], each[1], flank[1], lens[1], camera[1]),
-            # What bends, distorts or foreshortens one flank does so to the other.
+            # Whatever bends, distorts or foreshortens one flank does the same to the other.
             (value.mean(), thirds.mean(axis=0), both, flank.mean(), lens.mean(), camera.mean()),
         )
     ]
@@ -182,7 +182,7 @@ def _bend_deg(thirds: Sequence[FlankLine | None], flank: FlankLine, tops: Array)
 
 
 def _camera_deg(angle_deg: float, view: View) -> float:
-    """By a camera above the plate and close by: how much steeper the pile may be than it looks, over √3 [°]."""
+    """How much steeper the pile may be than it looks to a camera above the plate and close by, over √3 [°]."""
     tangent, above = np.tan(np.radians(angle_deg)), np.radians(view.above_deg)
     from_above = np.hypot(tangent, np.sin(above)) / np.cos(above)
     close_by = tangent * np.hypot(1.0, view.near)
@@ -206,7 +206,7 @@ def _moved(image: Image, rows: int, edge: int) -> Iterator[Image]:
 
 
 def _jitter_deg(flank: FlankLine, step: float, noise_share: float) -> float:
-    """Of the line of ``flank`` [pixels of the silhouettes]."""
+    """Standard error by jitter of the line of ``flank`` [pixels of the silhouettes], in degrees."""
     length = max(abs(flank.u[1] - flank.u[0]), 3.0) * step
     jitter = np.hypot(ROUNDING * step, EDGE * noise_share)
     slope_error = jitter * np.sqrt(12.0 / max(length / BLOCK, 3.0)) / length

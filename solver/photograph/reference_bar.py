@@ -23,9 +23,9 @@ Image = npt.NDArray[np.bool_]
 
 LEAST_ASPECT = 4.0
 LEAST_LENGTH = 0.06
-"""Of the picture's longest side."""
+"""Smallest length of the bar, over the picture's longest side."""
 FILLED = (0.95, 1.03)
-"""Covered share of the rectangle of these moments: 1 of a rectangle, π/3 = 1.05 of an ellipse, 0.87 of a triangle."""
+"""Covered share of the rectangle of these moments: 1 for a rectangle, π/3 = 1.05 for an ellipse, 0.87 a triangle."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,11 @@ class Bar:
     along: tuple[float, float]
     """Unit vector of its length (y down)."""
     sharpness: float
-    """Change of grey per pixel about its rim."""
+    """Change of grey per pixel at its rim."""
 
 
 def reference_pixels(picture: Picture) -> float:
-    """Length [px of the picture] of the one bar that it shows; NotAPile where there is none, or more than one."""
+    """Length [px of the picture] of the one bar that it shows; NotAPile if there is none, or more than one."""
     scale = max(max(picture.grey.shape) / ROUGH, 1.0)
     grey = ndimage.gaussian_filter(reduced_grey(picture.grey, scale), 0.8)
     bars = bars_in(grey)
@@ -57,7 +57,7 @@ def reference_pixels(picture: Picture) -> float:
 
 
 def bars_in(grey: Array) -> list[Bar]:
-    """Every bar in ``grey``, in the mask that shows it sharpest: with its shadow it is a bar as well."""
+    """Every bar in ``grey``, from the mask that shows it sharpest: a bar together with its shadow is a bar as well."""
     light = illumination(grey)
     change = ndimage.gaussian_gradient_magnitude(grey, 1.0)
     found: list[Bar] = []
@@ -75,7 +75,7 @@ def bars_in(grey: Array) -> list[Bar]:
 
 
 def _same(one: Bar, other: Bar) -> bool:
-    """True if both are seen about the same place, beside each other by less than their widths."""
+    """True if both are at about the same place, offset sideways by less than their widths."""
     x, y = one.x - other.x, one.y - other.y
     along, across = x * other.along[0] + y * other.along[1], y * other.along[0] - x * other.along[1]
     return abs(along) < 0.25 * other.length and abs(across) < one.width + other.width
@@ -123,5 +123,5 @@ def _between_ends(grey: Array, bar: Bar, scale: float) -> float:
         share = (profile - outside) / (inside - outside)
         near = (np.abs(out) <= 3.0 * scale) & (share >= 0.5)
         ends.append(float(out[near].max()) if near.any() else 0.0)
-    # The last place inside; half a step further on lies the edge.
+    # These are the last places inside; the edge lies half a step further on.
     return 2.0 * half + sum(ends) + 0.25

@@ -1,10 +1,10 @@
-"""What a pile of one tone with it stands on, and what stands in its apex: a disc, a tray's rim, a dish; a funnel's tip.
+"""Supports of the pile's own tone under it, and bodies in its apex: a disc, a tray's rim, a dish; a funnel's tip.
 
-To the silhouette they are one body with the pile, so that its base line lies too low or its top too high. Both show in
+In the silhouette they are one body with the pile, so that its base line is too low or its top too high. Both show in
 how far the outline reaches at each height: on a body under the pile it leaps outward at one height on both sides, and
-goes straight down from there; at a funnel's tip it is as wide over a long stretch, and widens below.
+goes straight down from there; at a funnel's tip it keeps its width over a long stretch, and widens below.
 
-To a silhouette a gable on a house is a pile on a block: nothing tells them apart, and it is cut in the same way.
+In a silhouette a gable on a house is a pile on a block: nothing tells them apart, and it is cut in the same way.
 """
 
 from __future__ import annotations
@@ -21,42 +21,45 @@ Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.bool_]
 
 SHARP = 0.012
-"""Of the height: within twice as much the outline leaps from the pile out to the end of what is under it."""
+"""Share of the height; within twice as much the outline leaps from the pile to the end of the body under it."""
 LEAP = 0.06
-"""Of how far the pile reaches there: a smaller leap is of bodies, or of a rounded foot."""
+"""Smallest leap over how far the pile reaches there: a smaller one is that of bodies, or of a rounded foot."""
 BOTH = 1.7
-"""Times that on the mean of both sides: the pile may stand near one end."""
+"""Multiple of that for the mean of both sides: the pile may stand near one end."""
 SLACK = 3.0
-"""Pixels of the picture that a leap has at least."""
+"""Smallest leap in pixels of the picture."""
 SIDE = (0.25, 0.8)
 """Shares of its height between which the side of a body under the pile goes straight down; that of bodies is round."""
 UPRIGHT, LEAST_UPRIGHT = 0.07, 1.2
-"""Over that height, and pixels of the picture, by which it may grow there: a sphere's grows by 0.1 of it."""
+"""Largest growth there, over that height and in pixels of the picture: a sphere's side grows by 0.1 of it."""
 LOWEST, HIGHEST = 0.05, 0.75
-"""Of the height, between which a body under the pile ends."""
+"""Shares of the height between which the top of a body under the pile lies."""
 LEAST_HIGH = 10.0
-"""Pixels of the picture: of a layer of bodies that is no higher it cannot be seen that it is none."""
+"""Smallest height in pixels of the picture: a lower body cannot be told from a layer of bodies."""
 EVEN = 0.15
 """Rise over run by which the top of a body under the pile may slope."""
 CORNER = 0.08
-"""Share of its height below its top, where the outline of a body under the pile has hardly come in since half of it."""
+"""Share of its height below its top at which the outline of a body under the pile is hardly narrower than at half its
+height."""
 SQUARE, BLURRED = 0.13, 1.9
-"""By how much at most, over its height and in pixels of the picture: found are up to 0.10 and 1.9."""
+"""Largest narrowing there, over its height and in pixels of the picture: values up to 0.10 and 1.9 were found."""
 BALL = 0.27
-"""A sphere's comes in by 0.23 of its height, and that of a layer of alike bodies by 0.16 to 0.23: what does so by more
+"""A sphere narrows by 0.23 of its height, and a layer of similar bodies by 0.16 to 0.23: anything that narrows by more
 is a rim that is seen from above."""
 FLAT, ROUND = 1.0, 0.003
-"""Pixels of the picture, and share of the height, by which it may miss a line (root mean square)."""
+"""Pixels of the picture, and share of the height, by which the top may deviate from a line (root mean square)."""
 NECK, STEADY = 1.25, 0.9
 """Width of the end of a tip over that where it is thinnest, and of its beginning over that."""
 LEAST_NECK = 0.15
-"""Of the height: a body that sticks out of the apex is shorter."""
+"""Smallest length of a tip over the height: a body that sticks out of the apex is shorter."""
 LONGER = 1.5
-"""Times as long as it is thick: a body on the apex is about as high as wide, the tips found are over three times."""
+"""Smallest length of a tip over its thickness: a body on the apex is about as high as it is wide; the tips found are
+over three times as long."""
 THINNEST = 0.3
-"""Of the width of the pile: a tip is thinner."""
+"""Largest width of a tip over that of the pile."""
 THIN, LONG = 0.15, 0.12
-"""Of the height, and of the width, of the pile: a rim is thinner, and sticks out farther on either side."""
+"""Share of the pile's height below which a rim's thickness lies, and of its width by which it sticks out at least, on
+either side."""
 
 
 @dataclass(frozen=True)
@@ -76,8 +79,8 @@ class Support:
 def support_under(tops: Array, pixel: float) -> Support | None:
     """The body on which the pile of an outline of heights ``tops`` stands; None where the outline shows none.
 
-    ``pixel``: how many of the outline's there are in one of the picture. Something on one side only is none: bodies
-    make such corners as well.
+    ``pixel``: number of the outline's pixels along one of the picture. A leap on one side only does not count, because
+    bodies make such corners as well.
     """
     height = float(tops.max())
     apex = int(tops.argmax())
@@ -94,7 +97,7 @@ def support_under(tops: Array, pixel: float) -> Support | None:
     size = leap / np.maximum(LEAP * reach[:, z + half], SLACK * pixel)
     size = np.where(upright, size, 0.0)
     both = np.flatnonzero((size.min(axis=0) >= 1.0) & (size.mean(axis=0) >= BOTH))
-    # The highest one: what is under it is looked for again from there.
+    # The highest one: supports under it are looked for in the next round, from there.
     for k in both[::-1]:
         found = _top(tops, apex, reach[:, z[k] + half], reach[:, z[k] - half], pixel)
         if found is not None and not _of_bodies(found, reach, pixel):
@@ -104,7 +107,7 @@ def support_under(tops: Array, pixel: float) -> Support | None:
 
 
 def _of_bodies(found: Support, reach: Array, pixel: float) -> bool:
-    """Whether a corner of this top is as round as a body's: alike bodies in one layer end at one height as well.
+    """Whether a corner of this top is as round as a body's: similar bodies in one layer end at one height as well.
 
     ``reach`` is that of the outline, per side and height.
     """
@@ -123,7 +126,7 @@ def severed(part: Image) -> Image | None:
     width = (right - left + 1).astype(np.float64)
     widest = int(width[rows.size // 4 :].argmax()) + rows.size // 4
     long = max(4, round(LEAST_NECK * rows.size))
-    # A cone is narrower by a tenth of its width so much higher up; a tip is not.
+    # Over this height a cone narrows by a tenth of its width; a tip does not.
     tip = np.flatnonzero((width[:-long] >= STEADY * width[long:]) & (width[long:] <= THINNEST * width[widest])) + long
     tip = tip[tip < widest]
     if tip.size == 0:
@@ -139,7 +142,7 @@ def severed(part: Image) -> Image | None:
 
 def rimless(part: Image) -> Image:
     """``part`` of a mask (row 0 on top) without a glass dish's rim: thin bars that stick out of both sides, with
-    nothing right under them."""
+    nothing directly under them."""
     rows = np.flatnonzero(part.any(axis=1))
     body = ndimage.binary_opening(part, np.ones((max(3, round(THIN * rows.size)), 1), dtype=bool))
     columns = np.flatnonzero(body.any(axis=0))
@@ -166,8 +169,8 @@ def _reach(tops: Array, height: float) -> Array:
 
 
 def _top(tops: Array, apex: int, inner: Array, outer: Array, pixel: float) -> Support | None:
-    """The line through the tops of the columns between ``inner`` and ``outer`` reach (left, right); None where they are
-    on no line: bodies are round."""
+    """The line through the tops of the columns between ``inner`` and ``outer`` reach (left, right); None if they are
+    not on a line: bodies are round."""
     blur = round(2.0 * pixel)
     left = np.arange(apex - int(outer[0]) + blur, apex - int(inner[0]) - blur)
     right = np.arange(apex + int(inner[1]) + blur + 1, apex + int(outer[1]) - blur + 1)

@@ -1,1 +1,1 @@
-"""A pour from its scene to its record: how bodies are supplied, when it is over, what is kept, many side by side."""
+"""A pour from its scene to its record: how bodies are fed, when it is over, what is kept, many pours side by side."""

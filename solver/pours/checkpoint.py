@@ -1,10 +1,11 @@
-"""A pour interrupted and gone on with, or brought back to an earlier moment: the same bits as one that ran through.
+"""A pour interrupted and resumed, or brought back to an earlier moment: the same bits as one that ran through.
 
 A checkpoint file (``.npz``) holds the world's arrays (``solver/engine/snapshot.py``) and what the pour has decided so
-far. It can go on elsewhere, belongs to one scene, seed and version of the solver, and is refused for any other.
+far. The pour can be resumed elsewhere. A checkpoint belongs to one scene, seed and version of the solver, and is
+refused for any other.
 
-A kept moment (:class:`Kept`) goes back into the batch that it was taken from, while the pour runs. It holds only what
-moves (``solver/engine/moving_state.py``), so keeping one and going back is quicker than with a checkpoint.
+A kept moment (:class:`Kept`) is put back into the batch that it was taken from, while the pour runs. It holds only what
+moves (``solver/engine/moving_state.py``), so keeping one and going back to it are quicker than with a checkpoint.
 """
 
 from __future__ import annotations
@@ -63,9 +64,9 @@ class Checkpoint:
 
     seed: int
     fingerprint: str
-    """Of scene and solver."""
+    """Fingerprint of scene and solver."""
     decided: dict[str, Any]
-    """What the pour has decided so far, as JSON takes it."""
+    """What the pour has decided so far, in JSON types."""
     world: Arrays
 
 
@@ -76,7 +77,7 @@ class Kept:
     time: float
     """[s]"""
     scene: Scene
-    """With the parameters that were in force."""
+    """The scene with the parameters in force at that moment."""
     decided: Mapping[str, Any]
     lengths: tuple[int, ...]
     to_do: tuple[Any, ...]
@@ -85,12 +86,12 @@ class Kept:
 
     @property
     def nbytes(self) -> int:
-        """Memory that it takes [B], but for a few hundred."""
+        """Memory that it takes [B], except for a few hundred."""
         return self.world.nbytes
 
 
 def checkpoint_of(pour: Pour) -> Checkpoint:
-    """The present state of ``pour``, between two launches. Raises ParameterError while a person disturbs it."""
+    """The present state of ``pour``, between two launches. Raises ParameterError while a person is disturbing it."""
     if pour.disturbance:
         raise ParameterError(f"no checkpoint while {pour.disturbance}")
     decided: dict[str, Any] = {name: getattr(pour, name) for name in PLAIN}
@@ -106,15 +107,15 @@ def checkpoint_of(pour: Pour) -> Checkpoint:
         for time, step, pose, velocity in pour.supply.entries
     ]
     decided["free_surface"] = [[time, heights.tolist()] for time, heights in pour._free_surface]
-    # A round trip now makes an unfit value fail here, and what is restored the same as what is read from a file.
+    # With a round trip an unfit value fails here, and what is restored is the same as what is read from a file.
     decided = json.loads(json.dumps(decided))
     return Checkpoint(pour.seed, fingerprint(pour.scene), decided, pour.batch.take(pour.w))
 
 
 def resumed(batch: Batch, w: int, scene: Scene, kept: Checkpoint) -> Pour:
-    """The pour of ``kept`` in world ``w``, to be driven on.
+    """The pour of ``kept`` in world ``w``, ready to go on.
 
-    Raises ParameterError if ``scene`` or the solver is not the one that was interrupted.
+    Raises ParameterError if ``scene`` or the solver differs from that of the interrupted pour.
     """
     if kept.fingerprint != fingerprint(actual(scene)):
         raise ParameterError("the checkpoint belongs to another scene or another version of the solver")
@@ -151,7 +152,7 @@ def checkpoint_bytes(kept: Checkpoint) -> bytes:
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
-    """A checkpoint from its file; ParameterError naming the file if it is none."""
+    """A checkpoint from its file; ParameterError naming the file if it is not a checkpoint."""
     try:
         world = npz_arrays(path)
         head = json.loads(bytes(world.pop(HEAD)))
@@ -163,7 +164,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
 
 
 def fingerprint(scene: Scene) -> str:
-    """The same for pours of one key (mesh files by their contents), where a checkpoint holds the same arrays."""
+    """Equal for pours of one key (mesh files by their contents) whose checkpoints hold the same arrays."""
     held = [f"{group}.{name}" for group, table in TABLES.items() for name in table]
     return hashlib.sha256(f"{pour_key(scene, seed=0)} {PLAIN} {held}".encode()).hexdigest()
 
@@ -191,7 +192,7 @@ def put_back(pour: Pour, kept: Kept) -> None:
     pour.scene = kept.scene
     pour._to_do = list(kept.to_do)
     pour.supply.random.bit_generator.state = kept.random
-    # These wake every body; what follows puts the sleepers back to sleep.
+    # These wake every body; put_moving puts the sleepers back to sleep.
     pour.batch.set_law(pour.w, pour._table)
     pour.batch.set_effects(pour.w, kept.scene)
     pour.apply_pull()
@@ -199,5 +200,5 @@ def put_back(pour: Pour, kept: Kept) -> None:
 
 
 def growing(pour: Pour) -> tuple[list[Any], ...]:
-    """Lists that only grow, so that their length is enough to have them as they were."""
+    """Lists that only grow, so that their lengths are enough to restore them."""
     return pour.samples, pour.supply.entries, pour._free_surface

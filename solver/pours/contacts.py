@@ -1,4 +1,4 @@
-"""The contacts of a pour at one moment, and what they say about its bodies. NumPy only."""
+"""The contacts of a pour at one moment, and what they tell about its bodies. NumPy only."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Contacts:
     partner: Ints
     """Index of the other body, or -1 - index of a surface of the rig, shape (m,)."""
     point: Array
-    """Where they touch [m], shape (m, 3)."""
+    """Point of contact [m], shape (m, 3)."""
     normal: Array
     """Unit vector from the partner to the body, shape (m, 3)."""
     force: Array
@@ -28,12 +28,12 @@ class Contacts:
 
     @property
     def normal_force(self) -> Array:
-        """Part of the force along the normal [N], shape (m,); negative where the two pull."""
+        """Normal component of the force [N], shape (m,); negative where the two attract each other."""
         return np.einsum("ij,ij->i", self.force, self.normal)
 
     @property
     def tangential_force(self) -> Array:
-        """Size of the part of the force across the normal [N], shape (m,)."""
+        """Magnitude of the tangential component of the force [N], shape (m,)."""
         return np.linalg.norm(self.force - self.normal_force[:, None] * self.normal, axis=1)
 
 
@@ -51,7 +51,7 @@ def loads(contacts: Contacts, bodies: int) -> Array:
 
 
 def coordination_numbers(contacts: Contacts, bodies: int) -> Ints:
-    """How many other bodies each of ``bodies`` bodies touches, with however many spheres, shape (bodies,)."""
+    """Number of other bodies that each of ``bodies`` bodies touches, with however many spheres, shape (bodies,)."""
     among = contacts.partner >= 0
     pairs = np.unique(np.column_stack([contacts.body[among], contacts.partner[among]]), axis=0)
     return np.bincount(pairs.ravel(), minlength=bodies)

@@ -2,8 +2,8 @@
 
 A task is one pour, in one world and one thread, as in :class:`solver.pours.worker_pool.WorkerPool`; Dask hands out
 tasks, sends results back as they finish, and gives those of a worker that died to another. Workers may come and go, and
-none need be there at first: all that a task needs it brings along. Each needs this program in the same version and one
-thread: ``dask worker tcp://… --nthreads 1 --nworkers -1`` starts one per core.
+none need be there at first: a task brings along everything that it needs. Each worker needs the same version of this
+program and one thread: ``dask worker tcp://… --nthreads 1 --nworkers -1`` starts one per core.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ if TYPE_CHECKING:
     from solver.pours.run import Job
 
 CONNECTED = 10.0
-"""[s] in which a scheduler has to answer."""
+"""Time within which a scheduler has to answer [s]."""
 _rooms: Rooms | None = None
-"""Of this worker, once it has poured."""
+"""The batches of this worker, once it has poured."""
 
 
 @dataclass(frozen=True)
 class Program:
-    """What both sides have to have alike."""
+    """What must be the same on both sides."""
 
     version: str
     physics: int
@@ -43,7 +43,7 @@ class Program:
 
     @staticmethod
     def here() -> Program:
-        """That of this process."""
+        """The program of this process."""
         try:
             return Program(version("repose-explorer"), PHYSICS, chosen())
         except PackageNotFoundError:
@@ -54,9 +54,9 @@ class Program:
 
 
 class DaskPool:
-    """The workers of the scheduler at ``address``, e.g. ``tcp://127.0.0.1:8786``; used as a WorkerPool is.
+    """The workers of the scheduler at ``address``, e.g. ``tcp://127.0.0.1:8786``; used like a WorkerPool.
 
-    Raises SchedulerError where Dask is not installed or nobody answers there.
+    Raises SchedulerError if Dask is not installed or nobody answers there.
     """
 
     def __init__(self, address: str) -> None:
@@ -66,7 +66,7 @@ class DaskPool:
             raise SchedulerError(
                 f"--scheduler {address}: Dask is not installed; pip install 'repose-explorer[dask]'"
             ) from None
-        # Of a connection that breaks it would print a traceback; what comes of it is raised.
+        # It would print a traceback when a connection breaks; the consequences are raised as errors anyway.
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         self._address = address
         try:
@@ -77,9 +77,9 @@ class DaskPool:
     def run_queue(self, queue: deque[Job], room: Sequence[Scene]) -> Iterator[tuple[Job, Record]]:
         """Run the jobs in ``queue`` and yield (job, record) as each finishes; jobs may be appended meanwhile.
 
-        ``room`` lists scenes that any job has to fit into. Raises PourBrokeOff with a worker's error, WorkerLost where
-        workers died over the same pour again and again, SchedulerError for a worker that would pour something else or
-        where the scheduler has ended.
+        ``room`` lists scenes; every job has to fit into their sizes. Raises PourBrokeOff with a worker's error,
+        WorkerLost if workers died on the same pour again and again, and SchedulerError for a worker that would pour
+        something else or if the scheduler has ended.
         """
         from distributed import CancelledError, as_completed
         from distributed.scheduler import KilledWorker
@@ -127,7 +127,7 @@ class DaskPool:
 
 
 def _poured(job: Job, room: Room, asked_by: Program, key: str) -> Record:
-    """What a worker does; ``key``: that of the pour where it was asked for (`pour_key`)."""
+    """What a worker does; ``key``: the `pour_key` on the machine that asked for the pour."""
     from distributed import get_worker
 
     from solver.pours.run import run_job

@@ -1,6 +1,6 @@
-"""What a person does to a pile that is there: the plate is tapped or shaken, or one body is pulled.
+"""What a person can do to an existing pile: tap or shake the plate, or pull one body.
 
-The plate follows a displacement u(t) [m] that begins and ends at zero: in pieces of constant velocity, whose ends lie
+The plate follows a displacement u(t) [m] that begins and ends at zero, in pieces of constant velocity whose ends lie
 on u. A pull is a constant force on one body's centre of mass. Both act at moments that do not depend on launches.
 """
 
@@ -21,7 +21,7 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Tap:
-    """A pulse of vertical velocity up and down again: u(t) = amplitude · sin²(π t/duration), z upwards.
+    """A vertical pulse, up and down again: u(t) = amplitude · sin²(π t/duration), z upwards.
 
     Its largest velocity is π · amplitude/duration, its largest acceleration 2 π² · amplitude/duration².
     """
@@ -51,7 +51,7 @@ class Tap:
         return 2.0 * math.pi**2 * self.amplitude / self.duration**2
 
     def displacement(self, time: float) -> Vector:
-        """Of the plate [m], ``time`` [s] after the beginning."""
+        """Displacement of the plate [m], ``time`` [s] after the beginning."""
         return 0.0, 0.0, self.amplitude * math.sin(math.pi * time / self.duration) ** 2
 
     def __str__(self) -> str:
@@ -98,8 +98,8 @@ class Shake:
         return (2.0 * math.pi * self.frequency) ** 2 * self.amplitude
 
     def displacement(self, time: float) -> Vector:
-        """Of the plate [m], ``time`` [s] after the beginning."""
-        # The whole periods are taken off first, so that the end is exactly where the beginning was.
+        """Displacement of the plate [m], ``time`` [s] after the beginning."""
+        # Whole periods are subtracted first, so that the plate ends exactly where it began.
         phase = math.fmod(time * self.frequency, 1.0) if time < self.duration else 0.0
         return self.amplitude * math.sin(2.0 * math.pi * phase), 0.0, 0.0
 

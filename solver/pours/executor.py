@@ -1,4 +1,4 @@
-"""Where pours run: one protocol, with worker processes of this machine, or the workers of a Dask scheduler."""
+"""Where pours run: one protocol for worker processes on this machine and for the workers of a Dask scheduler."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from solver.pours.run import Job
 
 ADDRESS = re.compile(r"(tcp|tls|ws|wss)://([\w.-]+|\[[\da-fA-F:.]+\]):(?P<port>\d{1,5})")
-"""Of a scheduler, by the protocols that Dask itself has between machines."""
+"""Address of a scheduler, with the protocols that Dask itself uses between machines."""
 
 
 class SchedulerError(ValueError):
-    """The scheduler cannot be used, or a worker must not be; the message is one line, fit for a user."""
+    """The scheduler cannot be used, or a worker must not be used; the message is one line, fit for a user."""
 
 
 class Executor(Protocol):
@@ -28,12 +28,12 @@ class Executor(Protocol):
     def run_queue(self, queue: deque[Job], room: Sequence[Scene]) -> Iterator[tuple[Job, Record]]:
         """Run the jobs in ``queue`` and yield (job, record) as each finishes; jobs may be appended meanwhile.
 
-        ``room`` lists scenes that any job has to fit into. Raises PourBrokeOff with the error of a pour.
+        ``room`` lists scenes; every job has to fit into their sizes. Raises PourBrokeOff with the error of a pour.
         """
         ...
 
     def close(self) -> None:
-        """End what was started for it."""
+        """End the processes and connections that were started for it."""
         ...
 
     def __enter__(self) -> Self: ...
@@ -42,16 +42,16 @@ class Executor(Protocol):
 
 
 def check_scheduler(address: str, threads: int | None = None) -> None:
-    """Refuse an ``address`` that is none, and what cannot be had with a scheduler; "" is no scheduler, and fine.
+    """Refuse an invalid ``address``, and options that do not go with a scheduler; "" means no scheduler, and is fine.
 
-    Whether anybody answers there is known once :func:`executor` has asked.
+    Whether anybody answers there is known only once :func:`executor` has asked.
 
     Parameters
     ----------
     address
         PROTOCOL://HOST:PORT, such as "tcp://127.0.0.1:8786".
     threads
-        Processes of this machine that were asked for beside it.
+        Number of processes on this machine, if one was given as well.
 
     Raises
     ------
@@ -72,9 +72,9 @@ def check_scheduler(address: str, threads: int | None = None) -> None:
 
 
 def executor(workers: int | None = None, scheduler: str = "") -> Executor:
-    """``workers`` processes of this machine (None: one per core), or those of the Dask ``scheduler`` ("tcp://…").
+    """``workers`` processes on this machine (None: one per core), or those of the Dask ``scheduler`` ("tcp://…").
 
-    Raises SchedulerError where that is no address, nobody answers there, or Dask is not installed, ParameterError for
+    Raises SchedulerError if the address is invalid, nobody answers there, or Dask is not installed; ParameterError for
     less than one worker.
     """
     if scheduler:

@@ -1,12 +1,12 @@
-"""Which kernels are compiled and kept, so that of several processes that want the same ones a single one compiles them.
+"""Which kernels are compiled and kept, so that only one of several processes that need the same kernels compiles them.
 
-Places in the arrays are constants in the kernels. So every :class:`solver.engine.state.Capacity` has kernels of its
-own, and so has one that is allocated after another: a set of kernels belongs to a sequence of capacities. Taichi looks
-up what is kept when it starts, and does not see what another process compiles later. So a process that needs several
-asks here before it starts Taichi: it either is to compile them, or waits until the other has.
+Positions in the arrays are constants in the kernels. Every :class:`solver.engine.state.Capacity` therefore has its own
+kernels, and they also depend on what was allocated before: a set of kernels belongs to a sequence of capacities. Taichi
+looks up the kept kernels when it starts, and does not see what another process compiles later. So a process that needs
+several asks here before it starts Taichi: either it compiles them itself, or it waits until another process has.
 
 Every set has a file beside Taichi's own. It is locked while a process compiles, and no process leaves a lock behind;
-then it lists the kernels that were there. A file that is empty, or names a kernel that is gone, stands for nothing.
+afterwards it lists the kernels that were there. A file that is empty, or names a missing kernel, counts as absent.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if sys.platform != "win32":
 
 
 def missing(capacities: Sequence[Capacity]) -> list[Capacity]:
-    """Those of ``capacities``, allocated in this order by one thread, whose kernels are not known to be kept."""
+    """The ``capacities``, allocated in this order by one thread, whose kernels are not known to be kept."""
     there = set(_kernels())
     listed = [_listed(_place(capacities[: k + 1])) for k in range(len(capacities))]
     return [one for one, kernels in zip(capacities, listed, strict=True) if not kernels or not kernels <= there]
@@ -41,18 +41,18 @@ def missing(capacities: Sequence[Capacity]) -> list[Capacity]:
 
 @contextmanager
 def compiled_once(capacities: Sequence[Capacity]) -> Iterator[list[Capacity]]:
-    """Wait for kernels that other processes compile; yields those of ``capacities`` to compile within.
+    """Wait for kernels that other processes compile; yields the ``capacities`` to compile in the with block.
 
-    Nothing may have started Taichi in this process before, and ``capacities`` are to be allocated in this order. What
-    another process has begun and not kept, because it was killed or its disk is full, is not yielded: it is compiled
-    when it is needed, as if this were not here.
+    Taichi must not have been started in this process before, and ``capacities`` must be allocated in this order.
+    Kernels that another process began but did not keep, because it was killed or its disk is full, are not yielded:
+    they are compiled when they are needed, as if this function did not exist.
     """
     with ExitStack() as locks:
         kept_at_all = chosen() == "cpu" and os.environ.get("TI_OFFLINE_CACHE") != "0"
-        # A process of several threads, such as a worker of Dask, keeps none before its end: nobody is to wait for it.
+        # A process with several threads, such as a Dask worker, keeps none before it ends: nobody should wait for it.
         kept_at_all = kept_at_all and threading.active_count() == 1
         absent = missing(capacities) if kept_at_all else []
-        # In one order everywhere, so that no two processes wait for each other.
+        # In the same order everywhere, so that no two processes wait for each other.
         places = sorted((_place(capacities[: capacities.index(one) + 1]), one) for one in absent)
         claimed = [one for place, one in places if _claimed(place, locks)]
         mine = [one for one in missing(capacities) if one in claimed]
@@ -77,7 +77,7 @@ def _claimed(place: Path, locks: ExitStack) -> bool:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
-        # Shared, so that of many that wait none waits for another one's start.
+        # Shared, so that none of many waiting processes waits for another one to start.
         with suppress(OSError):
             fcntl.flock(file, fcntl.LOCK_SH)
         file.close()
@@ -108,7 +108,7 @@ def _place(capacities: Sequence[Capacity]) -> Path:
 
 @cache
 def _made_from() -> str:
-    """Digest of what makes the kernels."""
+    """Digest of the sources that make the kernels."""
     solver = Path(__file__).parents[1]
     files = [solver / "backend.py", solver / "engine/state.py"]
     for folder in ("engine/kernels", "laws", "effects"):

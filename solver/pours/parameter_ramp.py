@@ -1,8 +1,8 @@
 """Changing the stiffness of a resting pile without blowing it up.
 
 A stiffer contact at the same overlap holds more energy. The new constants are therefore approached over at least
-``RAMP_TIME`` (which of them, the contact law says; friction acts at once), tangential springs keep their displacement
-(their force scales with k_t), the time step is recomputed first, and the energy that the change put in is added up and
+``RAMP_TIME`` (the contact law says which of them; friction acts at once), tangential springs keep their displacement
+(their force scales with k_t), the time step is recomputed first, and the energy that the change puts in is summed and
 shown.
 """
 

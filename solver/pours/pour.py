@@ -1,9 +1,9 @@
 """One pour in one world of a batch: bodies enter, the rig acts, they pile up or flow, and the run ends.
 
-The rig says what it does and when a run is over (``rigs/rig.py``); nothing here knows a funnel from a drum. Everything
-that decides about a run happens at fixed simulated moments, every ``numerics.sample_interval``: bodies enter, curves
-are sampled, surfaces are set in motion, phases and outcomes are detected. How the steps in between are cut into
-launches makes no difference to a single bit.
+The rig says what it does and when a run is over (``rigs/rig.py``); nothing here distinguishes a funnel from a drum.
+Everything that decides about a run happens at fixed simulated moments, every ``numerics.sample_interval``: bodies
+enter, curves are sampled, surfaces are set in motion, phases and outcomes are detected. How the steps in between are
+divided into launches does not change a single bit.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ Summary = dict[str, float]
 
 
 class Pour:
-    """State of one pour; ``scene`` is the one with its set-up effects carried out.
+    """State of one pour; ``scene`` is the scene with its set-up effects applied.
 
     Drive it with :meth:`steps_due`, ``batch.advance`` and :meth:`after`.
     """
@@ -95,7 +95,7 @@ class Pour:
 
     @property
     def time(self) -> float:
-        """Simulated time [s], whatever the launches."""
+        """Simulated time [s], which does not depend on the launches."""
         return self._time_base + (self.steps - self._steps_base) * self.dt
 
     @property
@@ -110,7 +110,7 @@ class Pour:
 
     @property
     def gate_opened(self) -> float:
-        """Time [s] at which the rig began to act; 0 for ``pour_through``, and as long as it has not."""
+        """Time [s] at which the rig began to act; 0 for ``pour_through``, and until it begins."""
         return self._began or 0.0
 
     @property
@@ -120,7 +120,7 @@ class Pour:
 
     @property
     def phase(self) -> Phase:
-        """Where the pour is."""
+        """Phase of the pour."""
         if self.ended[0] == Outcome.AT_REST:
             return Phase.AT_REST
         if self.supply.missing > 0 or self.gate_shut:
@@ -141,17 +141,17 @@ class Pour:
         return limit if at_most is None else min(limit, at_most)
 
     def decides_after(self, steps: int) -> bool:
-        """Whether ``steps`` more lead to a moment of decision."""
+        """Whether a moment of decision is reached after ``steps`` more."""
         return steps >= self._left
 
     def after(self, steps: int, row: npt.NDArray[np.float64] | None = None) -> bool:
-        """Take note of ``steps`` that were run. True at a moment of decision; it asks for this world's summary."""
+        """Take note of ``steps`` that were run. True at a moment of decision, which needs this world's summary."""
         if row is None and self.decides_after(steps):
             raise ValueError("a moment of decision asks for the world's summary")
         self.steps += steps
         self._left -= steps
         if self._ramp is not None:
-            # At moments of its own: a launch that was cut short must not change the bits of what follows.
+            # At its own moments: a launch that was cut short must not change the bits of what follows.
             self._ramp_left -= steps
             if self._ramp_left <= 0:
                 self._follow_ramp(self._ramp)
@@ -169,8 +169,8 @@ class Pour:
         """Let the running pour follow the material of ``scene``; wakes it up if it had come to rest.
 
         Friction and effects act at once; stiffness and damping are ramped (see ``solver/pours/parameter_ramp.py``).
-        Only materials, pairs and effects of contacts and bodies may differ from the present scene; anything else takes
-        a new pour. For effects the batch needs them compiled in (RuntimeError otherwise): see :meth:`move_to`.
+        Only materials, pairs and effects of contacts and bodies may differ from the present scene; anything else needs
+        a new pour. Effects must be compiled into the batch (RuntimeError otherwise): see :meth:`move_to`.
         """
         scene = actual(scene)
         target = law_table(scene)
@@ -186,7 +186,7 @@ class Pour:
     def move_plate(self, motion: PlateMotion) -> None:
         """Begin to move the plate, which ends where it began; wakes the pour up if it had come to rest.
 
-        Raises ParameterError for a rig without a plate and while the plate moves already.
+        Raises ParameterError for a rig without a plate and while the plate is already moving.
         """
         if PLATE not in self.rig.surface_names:
             raise ParameterError(f"{self.rig.name}: has no plate that can be moved")
@@ -211,12 +211,12 @@ class Pour:
 
     @property
     def disturbance(self) -> str:
-        """What is done to the pile now, in words; empty where nothing is."""
+        """What is being done to the pile, in words; empty for nothing."""
         motion = None if self._motion is None else self._motion[0]
         return "; ".join(str(one) for one in (motion, self._pull) if one is not None)
 
     def move_to(self, batch: Batch) -> None:
-        """Go on in ``batch``, in the same world, with the same bits: for instance in one with effects compiled in."""
+        """Go on in ``batch``, in the same world, with the same bits: for example in one with effects compiled in."""
         kept = self.batch.take(self.w)
         batch.load(self.w, self.scene, self.supply.layout, self.dt, (True,) * len(self.rig.surfaces()))
         batch.set_law(self.w, self._table)
@@ -241,7 +241,7 @@ class Pour:
         state = self.batch.bodies(self.w, self.entered)
         bodies = bodies_of(self.scene, self.supply.order, self.supply.layout, state)
         spheres = member_spheres(self.scene, bodies)
-        # What rolls away is no part of a pile at rest; at a given moment it lies where it is, for a camera as well.
+        # What rolls away is no part of a pile at rest; in a reading at a given time it counts, as for a camera.
         rolling = None if self.scene.numerics.duration > 0.0 else rolling_away(self.scene, self.container, state)
         in_pile = lying(self.container, bodies, rolling)
         return Record(
@@ -265,7 +265,7 @@ class Pour:
         )
 
     def _interval_steps(self) -> int:
-        """Steps to the next moment of decision; the moment of the reading is one, wherever it falls."""
+        """Steps to the next moment of decision; the moment of the reading is one too, wherever it falls."""
         numerics = self.scene.numerics
         interval = round(numerics.sample_interval / self.dt)
         if numerics.duration > self.time:
@@ -281,10 +281,10 @@ class Pour:
             self._supplied += self._mechanical_energy(b, entry.pose.position, entry.velocity)
 
     def _act(self) -> None:
-        """Carry out what the rig has to do by now."""
+        """Carry out the actions of the rig that are due."""
         if self._began is None:
             return
-        # Less a hair: the sum of many steps must not miss a moment by rounding.
+        # A small tolerance: rounding in the sum of many steps must not miss a moment.
         while self._to_do and self._to_do[0].after <= self.time - self._began + 1e-9:
             action = self._to_do.pop(0)
             if isinstance(action, Switch):
@@ -319,14 +319,14 @@ class Pour:
         self._act()
 
     def _watch(self) -> None:
-        """Keep the free surface of this moment, if the rig wants it."""
+        """Record the free surface at this moment, if the rig asks for it."""
         watch = self.rig.watch
         if watch is not None and self._began is not None and self.time - self._began >= watch.after:
             spheres = member_spheres(self.scene, self.bodies())
             self._free_surface.append((self.time, surface_heights(spheres, watch.half_width) - watch.height))
 
     def _told(self) -> Verdict:
-        """What the pour, if it has ended, has left: read off the raw pour, so that a stored one tells the same."""
+        """Outcome of the pour, if it has ended: read from the raw pour, so that a stored one gives the same."""
         if self.ended[0] != Outcome.AT_REST or not self.rig.leaves_heap:
             return self.ended
         kept = unpacked(packed(self.record()))
@@ -336,7 +336,7 @@ class Pour:
         return at_rest(self._quiet_samples, self.scene.numerics)
 
     def _blocked(self) -> bool:
-        """The next body has been due for long and finds no place: the rig is full to the feed opening."""
+        """Whether the next body has long been due and finds no place: the rig is full to the feed opening."""
         return self.supply.overdue(self.time, SETTLE_LIMIT)
 
     def _across(self) -> Obstruction | None:
@@ -384,7 +384,7 @@ class Pour:
             self._motion, velocity = None, np.zeros(3)
         else:
             rest = min(motion.piece, motion.duration - since)
-            # Less a hair: a sum of steps must not make a piece of one more.
+            # A small tolerance: rounding in a sum of steps must not add a step to a piece.
             self._motion_left = max(1, math.ceil(rest / self.dt - 1e-6))
             took = self._motion_left * self.dt
             here = self.surface_poses()[plate, :3] - np.array(self.rig.surfaces()[plate].pose.origin)

@@ -1,10 +1,10 @@
-"""When two pours are the same pour: the key under which one is kept.
+"""When two pours are the same pour: the key under which a pour is kept.
 
 A key covers what decides the bits of a pour and nothing else: the declared scene, the contents of mesh files, the seed,
 and the version of the physics. Parameters at their declared default are left out, so that a new parameter whose default
-changes nothing leaves every key as it was; a changed default is a change of the physics (`solver.version`). Of a rig or
-an effect from another package, its version counts. So does the kind of processor (CPU or GPU). Titles, docstrings, and
-code that cannot touch a pour have no part in it.
+changes nothing leaves every key as it was; a changed default is a change of the physics (`solver.version`). For a rig
+or an effect from another package, the version of the package counts. So does the kind of processor (CPU or GPU).
+Titles, docstrings, and code that cannot affect a pour have no part in it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def pour_key(scene: Scene, seed: int, variant: str = "") -> str:
     scene, seed:
         What is poured.
     variant:
-        What else was done to the pour that no scene says, such as an effect from outside the library.
+        What else was done to the pour that is not in the scene, such as an effect from outside the library.
 
     Returns
     -------
@@ -44,7 +44,7 @@ def pour_key(scene: Scene, seed: int, variant: str = "") -> str:
 
 
 def pour_keys(scene: Scene, seeds: Iterable[int], variant: str = "") -> dict[int, str]:
-    """Return the `pour_key` of ``scene`` with each of ``seeds``; the scene, which takes the time, is described once."""
+    """Return the `pour_key` of ``scene`` with each of ``seeds``; the scene, the slow part, is described only once."""
     before, after = json.dumps(PHYSICS), f"{json.dumps(variant)}, {json.dumps(chosen())}"
     described = json.dumps(_decisive(scene), sort_keys=True)
     texts = {seed: f"[{before}, {seed}, {after}, {described}]" for seed in seeds}
@@ -52,7 +52,7 @@ def pour_keys(scene: Scene, seeds: Iterable[int], variant: str = "") -> dict[int
 
 
 def _decisive(scene: Scene) -> dict[str, Any]:
-    """What decides the bits, as JSON takes it: floats are written in the digits that give them back."""
+    """What decides the bits, in JSON types: floats are written with the digits that restore them exactly."""
     return {
         "rig": [scene.rig.name, scene.rig.wall, *_set(scene.rig), *_package("rig", scene.rig.name)],
         "insertion": _set(scene.insertion),
@@ -79,7 +79,7 @@ def _set(thing: Any) -> list[Any]:
         if declared is None:
             continue
         if declared["files"]:
-            # Wherever it lies and whatever it is called; a shipped one may change as well.
+            # Regardless of its place and name; a shipped file may change as well.
             found.append([field.name, _contents(asset_path("meshes", value))])
         elif value != field.default:
             found.append([field.name, value])
@@ -87,20 +87,20 @@ def _set(thing: Any) -> list[Any]:
 
 
 def _package(kind: str, name: str) -> list[str]:
-    """Package and version that a plug-in comes from; nothing for what this program has itself."""
+    """Package and version that a plug-in comes from; nothing for what belongs to this program."""
     package = origin(kind, name)
     return [package] if package else []
 
 
 def _revision(effect: Effect) -> list[int]:
-    """Of an effect whose pours are not those of its first revision."""
+    """Revision of an effect, if its pours differ from those of its first revision."""
     return [effect.revision] if effect.on and effect.revision > 1 else []
 
 
 def _of_body(body: Body) -> list[Any]:
     shape = body.shape
     if isinstance(shape, Members):
-        # What is only drawn, and how well the spheres follow it, decides nothing.
+        # The surface that is only drawn, and how well the spheres follow it, decide nothing.
         described: list[Any] = ["spheres", shape.centres, shape.radii, shape.mass, shape.inertia, shape.density]
     else:
         contents = _contents(Path(shape.file)) if shape.file else ""

@@ -1,4 +1,4 @@
-"""What is kept of a finished pour: enough to read every observable again, and a new one, without pouring.
+"""What is kept of a finished pour: enough to read every observable again, even a new one, without pouring.
 
 A raw pour is a compressed NumPy archive (``.npz``):
 
@@ -11,12 +11,12 @@ A raw pour is a compressed NumPy archive (``.npz``):
     quaternion (n, 4)                   orientation wxyz, in units of ``TURN``
     clock (k, 3)                        time [s], entered and discharged mass [kg]
     curves (k, 9)                       the other curves of `solver.pours.record.Trace`, in the order of ``CURVES``
-    surface_time (m,), surface_x (c,), surface (m, c)    the free surface of a rig that watches one: moments [s], places
+    surface_time (m,), surface_x (c,), surface (m, c)    free surface of a rig that records one: moments [s], places
                                         [m]; heights in units of ``LENGTH``, ``HOLE`` where there is no bed, as
                                         differences along a row
 
-Lengths are rounded to 0.01 mm, 1/25 of a pixel of the silhouettes. Velocities, the way bodies entered, and what the
-scene says of materials, feed and numerics are not kept; a raw pour is of a scene whose parameters are stored beside it.
+Lengths are rounded to 0.01 mm, 1/25 of a pixel of the silhouettes. Velocities, the way bodies entered, and the scene's
+materials, feed and numerics are not kept; the parameters of the scene are stored beside its raw pour.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from solver.version import PHYSICS
 
 FORMAT = 1
 LENGTH = 1e-5
-"""Unit of the lengths that are kept [m]."""
+"""Unit of the stored lengths [m]."""
 TURN = 1.0 / 32767
 """Unit of the components of a quaternion."""
 HOLE = -(2**31) // 2
@@ -58,7 +58,7 @@ CURVES = (
 
 
 class RawPourError(ValueError):
-    """Bytes that are no raw pour of a known format; the message is one line, fit for a user."""
+    """Bytes that are not a raw pour of a known format; the message is one line, fit for a user."""
 
 
 def packed(record: Record) -> bytes:
@@ -96,11 +96,11 @@ def packed(record: Record) -> bytes:
 
 
 def unpacked(raw: bytes) -> Record:
-    """Return the record of a raw pour, on which observables read the same numbers every time.
+    """Return the record of a raw pour, from which observables read the same numbers every time.
 
-    Its outcome is how the motion ended, and what is read off the pile that it left (``observables/heap.py``). Its scene
+    Its outcome follows from how the motion ended and from the pile that it left (``observables/heap.py``). Its scene
     holds the rig and the bodies by their member spheres; velocities are NaN and no entries are listed. Raises
-    RawPourError for bytes that are no raw pour, or one of another format or of a rig that is not known.
+    RawPourError for bytes that are not a raw pour, or one of another format or of an unknown rig.
     """
     try:
         return _unpacked(raw)

@@ -1,4 +1,4 @@
-"""What a run leaves behind: outcome, curves and the final state. NumPy only; nothing here can be changed."""
+"""What a run leaves behind: outcome, curves and the final state. NumPy only; everything here is immutable."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class Outcome(StrEnum):
     """How a run ended and what it left.
 
     Valid are ``AT_REST``, a pile, and ``MEASURED``: a rig that keeps moving has run for its time, or a pour was read
-    after ``numerics.duration``. Where the rig is read for its heap's angle of repose and what came to rest is no heap,
-    the outcome is ``NO_HEAP`` (``observables/heap.py``).
+    after ``numerics.duration``. If the angle of repose of the rig's heap is to be read, but what came to rest is not a
+    heap, the outcome is ``NO_HEAP`` (``observables/heap.py``).
     """
 
     RUNNING = "running"
@@ -36,21 +36,21 @@ class Outcome(StrEnum):
 
     @property
     def valid(self) -> bool:
-        """True if what is read off the run counts."""
+        """True if readings of the run count."""
         return self in (Outcome.AT_REST, Outcome.MEASURED)
 
     @property
     def unstable(self) -> bool:
-        """True if the numbers of the run cannot be trusted: it diverged, or lost what it should hold."""
+        """True if the numbers of the run cannot be trusted: it diverged, or lost something that it should hold."""
         return self in (Outcome.NON_FINITE, Outcome.OVERLAP_LIMIT, Outcome.BUFFER_OVERFLOW, Outcome.LOST_BODY)
 
 
 Verdict = tuple[Outcome, str]
-"""Outcome and message; the message is empty where the outcome says all."""
+"""Outcome and message; the message is empty where the outcome says everything."""
 
 
 class Phase(StrEnum):
-    """Where a pour is."""
+    """Phase of a pour."""
 
     FILL = "fill"
     DISCHARGE = "discharge"
@@ -132,17 +132,17 @@ class Trace:
     elastic_energy: Array
     """In the normal and tangential springs of the contacts [J]."""
     dissipated_energy: Array
-    """What contacts, and bodies that fell asleep, have taken so far [J]."""
+    """Energy dissipated so far in contacts, and by bodies falling asleep [J]."""
     wall_work: Array
-    """Work of moving surfaces on the bodies so far [J]."""
+    """Work done by moving surfaces on the bodies so far [J]."""
     taken_out_energy: Array
     """Kinetic and potential energy that bodies had when they were taken out of the domain [J]."""
     supplied_energy: Array
-    """Kinetic and potential energy of the bodies as they entered, and what changes of the stiffness put in [J]."""
+    """Kinetic and potential energy of the bodies as they entered, and energy put in by changes of stiffness [J]."""
 
     @property
     def energy_error(self) -> Array:
-        """By how much the account misses, as a fraction of the energy put in; NaN where none was.
+        """Error of the energy balance, as a fraction of the energy put in; NaN where none was.
 
         (kinetic + potential + elastic + dissipated + taken out − supplied − wall work) / (supplied + |wall work|)
         """
@@ -168,7 +168,7 @@ class FreeSurface:
 class Entries:
     """How the bodies of a run entered, in order of entry (n of them): what another program needs to repeat the feed.
 
-    A body is at its place when ``step`` steps are done and takes part from the next one on; it does not turn.
+    A body is at its place after ``step`` steps and takes part from the next one on; it enters without rotating.
     """
 
     time: Array
@@ -192,10 +192,10 @@ class Record:
     scene: Scene
     seed: int
     outcome: Outcome
-    """What is told: that of ``ended``, or ``NO_HEAP``."""
+    """The outcome to report: that of ``ended``, or ``NO_HEAP``."""
     message: str
     ended: Verdict
-    """How the motion ended, whatever it left. This is what a raw pour keeps; the rest is read off the pile."""
+    """How the motion ended, whatever it left. A raw pour keeps only this; the rest is read from the pile."""
     bodies: Bodies
     spheres: Spheres
     in_pile: npt.NDArray[np.bool_]

@@ -53,8 +53,9 @@ def member_spheres(scene: Scene, bodies: Bodies) -> Spheres:
 def rolling_away(scene: Scene, container: Container, state: Array) -> npt.NDArray[np.bool_]:
     """Bodies that still roll outward on the plate, alone and beyond the container's radius.
 
-    ``rolls_away`` of ``engine/kernels/batch.py``, for bodies that also move faster than ``numerics.rest_speed``.
-    ``state``: rows of ``Batch.bodies``. Nothing brakes them, so where they are is a matter of when one looks.
+    The criterion is ``rolls_away`` of ``engine/kernels/batch.py``, for bodies that also move faster than
+    ``numerics.rest_speed``. ``state``: rows of ``Batch.bodies``. Nothing slows these bodies down, so their positions
+    depend on when one looks.
     """
     x, v, touching = state[:, 0:3], state[:, 7:10], state[:, 14]
     beyond = np.hypot(x[:, 0], x[:, 1]) > container.radius
@@ -65,7 +66,7 @@ def rolling_away(scene: Scene, container: Container, state: Array) -> npt.NDArra
 
 
 def measured_from(pile: Pile, axis: tuple[float, float]) -> Pile:
-    """``pile`` as seen from a point of the plate from which the rig's axis stands at ``axis`` [m]."""
+    """``pile`` in coordinates about a point of the plate from which the rig's axis is at ``axis`` [m]."""
     if axis == (0.0, 0.0):
         return pile
     shift = np.array([*axis, 0.0])
@@ -93,7 +94,7 @@ def pile_of(bodies: Bodies, spheres: Spheres, chosen: npt.NDArray[np.bool_]) -> 
 
 
 def free_surface_of(watch: Watch | None, kept: list[tuple[float, Array]]) -> FreeSurface | None:
-    """The free surface at the moments ``kept`` (time, heights); None where none was kept."""
+    """The free surface at the moments ``kept`` (time, heights); None if none was kept."""
     if watch is None or not kept:
         return None
     return FreeSurface(

@@ -1,4 +1,4 @@
-"""Run many pours: a batch of worlds whose slots are filled again as pours finish."""
+"""Run many pours: a batch of worlds whose slots are refilled as pours finish."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from solver.pours.record import Record
 from solver.scenes.scene import Scene, actual, body_counts, poured_mass
 
 MOST_BODIES = 1_000_000
-"""In one pour; more are a slip of a unit."""
+"""In one pour; more are due to a wrong unit."""
 CONTACTS_PER_MEMBER = 16
 """Room in the contact list: entries per member sphere. A bed of long bodies holds 2–4."""
 
 WORLDS_PER_THREAD = 4
-"""Pours in flight per thread: enough to even out that some are free flight and some a packed pile."""
+"""Pours in flight per thread: enough to balance those in free flight against those with a packed pile."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Job:
 
 
 def capacity_for(scenes: Sequence[Scene], worlds: int) -> Capacity:
-    """A batch for any of ``scenes``, which share a contact law: :func:`sizes_for` them, and what is compiled in."""
+    """Capacity of a batch for any of ``scenes``, which share a law: :func:`sizes_for` them, and what is compiled in."""
     return replace(sizes_for(scenes, worlds), **compiled_in([actual(scene) for scene in scenes]))
 
 
@@ -92,9 +92,9 @@ def run_queue(
 ) -> Iterator[tuple[Job, Record]]:
     """Run the jobs in ``queue`` and yield (job, record) as each finishes; jobs may be appended meanwhile.
 
-    ``room`` lists scenes that any job has to fit into, ``worlds`` is the number of pours in flight (default: four per
-    thread), ``on_sample`` is called with (job, pour) at every moment of decision. Equal job → equal bits, whatever else
-    is in flight. Pours of different contact laws run in a batch each.
+    ``room`` lists scenes; every job has to fit into their sizes. ``worlds`` is the number of pours in flight (default:
+    four per thread). ``on_sample`` is called with (job, pour) at every moment of decision. Equal jobs give equal bits,
+    whatever else is in flight. Each contact law has a batch of its own.
     """
     backend.init(threads=threads)
     cores = threads or available_cores()

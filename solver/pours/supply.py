@@ -1,4 +1,4 @@
-"""What is fed into a pour: its bodies in order of entry, when each is due, and how those in it have entered."""
+"""What is fed into a pour: its bodies in order of entry, when each is due, and how those already in it entered."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Entry(NamedTuple):
 
 
 class Supply:
-    """The bodies of one pour: order, sizes, orientations and places come from one generator, so a seed repeats them."""
+    """The bodies of one pour; the seed determines their order, sizes, orientations and places."""
 
     def __init__(self, scene: Scene, seed: int) -> None:
         self.random = np.random.default_rng(seed)
@@ -52,7 +52,7 @@ class Supply:
 
     @property
     def missing(self) -> int:
-        """Number of bodies that have not."""
+        """Number of bodies that have not yet entered."""
         return len(self.order) - len(self.entries)
 
     @property
@@ -62,7 +62,7 @@ class Supply:
 
     @property
     def entered_mass(self) -> float:
-        """Mass of those that have entered [kg]."""
+        """Mass of the bodies that have entered [kg]."""
         return float(self.layout.numbers[: self.entered, 0].sum())
 
     @property
@@ -72,7 +72,7 @@ class Supply:
 
     @property
     def last_entry(self) -> float:
-        """When the last one did [s]; 0 before the first."""
+        """When the last body entered [s]; 0 before the first."""
         return self.entries[-1].time if self.entries else 0.0
 
     def due(self, time: float) -> bool:
@@ -80,7 +80,7 @@ class Supply:
         return self.missing > 0 and bool(self._due[self.entered] <= time)
 
     def overdue(self, time: float, by: float) -> bool:
-        """Whether the next body might have entered more than ``by`` [s] ago."""
+        """Whether the next body has been due for more than ``by`` [s]."""
         return self.missing > 0 and bool(time > self._due[self.entered] + by)
 
     def placed(self, feed: Feed, there: Spheres, time: float, step: int) -> Iterator[tuple[int, Entry]]:

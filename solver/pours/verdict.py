@@ -1,8 +1,9 @@
-"""How a pour stands at a moment of decision: still running, at rest, or over in another way. Pure functions of it.
+"""State of a pour at a moment of decision: still running, at rest, or over in another way. Pure functions.
 
-At rest: what counts has been slower than ``numerics.rest_speed`` for ``numerics.rest_time``. The speed of a body is
-√(2 kinetic energy / mass), so one that spins on the spot is not at rest. What counts is all but bodies that roll away
-beyond the pile (``rolls_away`` of ``engine/kernels/batch.py``), and the filling of a rig while its gate is shut.
+At rest: all that counts has been slower than ``numerics.rest_speed`` for ``numerics.rest_time``. The speed of a body is
+√(2 kinetic energy / mass), so one that spins on the spot is not at rest. What counts are all bodies except those that
+roll away beyond the pile (``rolls_away`` of ``engine/kernels/batch.py``), and the filling of a rig while its gate is
+shut.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from solver.scenes.numerics import Numerics
 
 RUNNING: Verdict = (Outcome.RUNNING, "")
 STALL_TIME = 0.5
-"""A container that has let nothing out for this long [s] is done, even if what is stuck in it rocks: twice the time
-that a body needs to fall through the funnel."""
+"""A container that has released nothing for this long [s] is done, even if bodies stuck in it still rock: twice the
+time that a body needs to fall through the funnel."""
 
 
 @dataclass(frozen=True)
@@ -33,15 +34,15 @@ class Moment:
     acting: float | None
     """Time since the rig began to act [s]; None while it is filled."""
     acted: bool
-    """The rig has done all that it does."""
+    """Whether the rig has completed its actions."""
     missing: int
-    """Bodies that have not entered."""
+    """Number of bodies that have not entered."""
     blocked: bool
-    """The next one has been due for long and finds no place."""
+    """Whether the next body has long been due and finds no place."""
     quiet: bool
-    """What counts has been slow for ``numerics.rest_time``."""
+    """Whether what counts has been slow for ``numerics.rest_time``."""
     stalled: bool
-    """Nothing has left the container for long, although it could."""
+    """Whether nothing has left the container for long, although it could."""
     speed: float
     """Largest speed of what counts [m/s]."""
     room: int
@@ -49,7 +50,7 @@ class Moment:
     poured_mass: float
     """The charge: mass that was to be poured [kg]."""
     across: Obstruction | None = None
-    """What lies across the outlet; looked for only where everything may be over."""
+    """What lies across the outlet; looked for only when the pour may be over."""
 
 
 def verdict(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
@@ -68,17 +69,17 @@ def speed_that_counts(row: Mapping[str, float], gate_shut: bool) -> float:
 
 
 def slow_moments(before: int, speed: float, disturbed: bool, numerics: Numerics) -> int:
-    """Moments of decision in a row at which all was slow: ``before`` and this one; 0 while the plate is moved."""
+    """Number of slow moments of decision in a row: ``before`` and this one; 0 while the plate is moved."""
     return before + 1 if speed < numerics.rest_speed and not disturbed else 0
 
 
 def at_rest(slow: int, numerics: Numerics) -> bool:
-    """Whether all has been slow for long enough, after ``slow`` moments of decision at which it was."""
+    """Whether all has been slow for long enough, after ``slow`` such moments of decision in a row."""
     return slow * numerics.sample_interval >= numerics.rest_time
 
 
 def stalled(samples: Sequence[Mapping[str, float]], numerics: Numerics, since: float) -> bool:
-    """Whether nothing has left the container for ``STALL_TIME``, of those ``samples`` after the time ``since`` [s]."""
+    """Whether nothing has left the container for ``STALL_TIME``, by the ``samples`` after the time ``since`` [s]."""
     back = math.ceil(STALL_TIME / numerics.sample_interval)
     if len(samples) <= back or samples[-1]["time"] - since <= STALL_TIME:
         return False
@@ -115,13 +116,13 @@ def _overfull(rig: PourRig, moment: Moment) -> Verdict:
 
 def _ended(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
     """The rig has run for its time, the moment of the reading has come, or all has come to rest."""
-    # Without a limit on time a person at the screen ends the run.
+    # Without a time limit a person at the screen ends the run.
     limited = math.isfinite(numerics.max_time)
     if rig.running_time is not None:
         over = limited and moment.acting is not None and moment.acting >= rig.running_time
         return (Outcome.MEASURED, "") if over else RUNNING
     if numerics.duration > 0.0 and limited:
-        # Less a hair: the sum of many steps must not miss the moment by rounding.
+        # A small tolerance: rounding in the sum of many steps must not miss the moment.
         return (Outcome.MEASURED, "") if moment.time >= numerics.duration - 1e-9 else RUNNING
     return _come_to_rest(rig, numerics, moment)
 
@@ -148,7 +149,7 @@ def _come_to_rest(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
 
 
 def may_be_over(moment: Moment) -> bool:
-    """Whether the rig has got all that it takes and has done all that it does, and what counts is slow."""
+    """Whether the rig has received all that it can take and has completed its actions, and what counts is slow."""
     fed = moment.acting is not None and moment.acted and (moment.missing == 0 or moment.blocked)
     return fed and moment.quiet
 

@@ -1,10 +1,10 @@
 """Worker processes that run pours side by side: one thread and one world each, so that none waits for another.
 
 In one process all worlds wait at the end of a launch for the slowest, and while Python feeds and samples one world the
-other cores rest: two threads of :func:`solver.pours.run.run_queue` do the work of 1.5, two workers that of 2. The bits
-are the same. Of workers that need kernels which nobody has compiled yet, one compiles them and the others wait. A
-worker ends with its pipe: at :meth:`WorkerPool.close`, or when the process that made it is gone. One that is killed,
-by a user or for memory, is replaced, and its pour begun again.
+other cores are idle: two threads of :func:`solver.pours.run.run_queue` do the work of 1.5, two workers that of 2. The
+bits are the same. If several workers need kernels that have not been compiled yet, one compiles them and the others
+wait. A worker ends with its pipe: at :meth:`WorkerPool.close`, or when the process that made it is gone. A worker that
+is killed, by a user or for memory, is replaced, and its pour is begun again.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ MOMENTS = 3
 """Moments of decision of a pour after which its kernels are compiled."""
 GONE = "a worker process has ended before its work was done"
 LOSSES = 3
-"""Workers that may end over one pour: a fourth would, too."""
+"""Number of workers lost on one pour after which it is given up: a fourth would be lost, too."""
 
 
 _log = logging.getLogger(__name__)
@@ -69,14 +69,14 @@ class WorkerPool:
         if workers is not None and (not isinstance(workers, int | np.integer) or workers < 1):
             raise ParameterError(f"workers {workers}: allowed: a whole number of at least 1")
         self.workers = workers or available_cores()
-        """How many pour at the same time."""
+        """Number of processes that pour at the same time."""
         self._processes: list[tuple[BaseProcess, Connection]] = []
 
     def run_queue(self, queue: deque[Job], room: Sequence[Scene]) -> Iterator[tuple[Job, Record]]:
         """Run the jobs in ``queue`` and yield (job, record) as each finishes; jobs may be appended meanwhile.
 
-        ``room`` lists scenes that any job has to fit into. Raises PourBrokeOff with a worker's error, and WorkerLost
-        where ``LOSSES`` workers ended over the same job.
+        ``room`` lists scenes; every job has to fit into their sizes. Raises PourBrokeOff with a worker's error, and
+        WorkerLost if ``LOSSES`` workers ended on the same job.
         """
         self._processes += [_worker() for _ in range(self.workers - len(self._processes))]
         needed = Room.of(room)
@@ -117,13 +117,13 @@ class WorkerPool:
                     losses.pop(id(job), None)  # a job that is appended later may get the number of this one
                     yield job, record
         finally:
-            if busy:  # left before the end: what still runs is of no use
+            if busy:  # the caller left before the end: what still runs is of no use
                 self.close(at_once=True)
 
     def _with_room(self, pipe: Connection, room: Room) -> Connection:
-        """``pipe``, or that of another worker where its own has ended, told of the room that it has to have.
+        """``pipe``, or that of another worker if its own has ended, after sending the ``room`` that it must have.
 
-        Raises WorkerLost where the other one has ended, too.
+        Raises WorkerLost if the other worker has ended, too.
         """
         if _sent(pipe, room):
             return pipe
@@ -237,15 +237,15 @@ def _answer(pipe: Connection) -> Any:
 
 @contextmanager
 def deaf_to_interrupts() -> Iterator[None]:
-    """Processes that are started within do not hear Ctrl-C, from their first moment on.
+    """Processes that are started in the with block ignore Ctrl-C from their first moment on.
 
-    It reaches the whole group. A process can ignore it by itself only once it has imported what it runs, and until
-    then would print a traceback.
+    Ctrl-C reaches the whole process group. A process can ignore it by itself only once it has imported what it runs,
+    and until then would print a traceback.
     """
     if sys.platform == "win32":
         yield
         return
-    # Started with the first process otherwise, and that lets Ctrl-C through again.
+    # The tracker would otherwise start with the first process, and that lets Ctrl-C through again.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -256,9 +256,9 @@ def deaf_to_interrupts() -> Iterator[None]:
 
 @contextmanager
 def script_left_alone() -> Iterator[None]:
-    """Processes that are spawned within do not import the script that runs here, as multiprocessing has them do.
+    """Processes that are spawned in the with block do not import the running script, as multiprocessing makes them do.
 
-    It would begin again in each of them, unless its author guards it by ``if __name__ == "__main__"``.
+    The script would run again in each of them, unless its author guards it by ``if __name__ == "__main__"``.
     """
     script = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
@@ -270,8 +270,8 @@ def script_left_alone() -> Iterator[None]:
 
 def begin_worker() -> None:
     """Make this a worker process: one CPU thread, and Ctrl-C left to the process in charge."""
-    # It reaches the whole group; the process in charge decides, and its end closes the pipe. Only a program's first
-    # thread may set this, and only it is interrupted.
+    # Ctrl-C reaches the whole group; the process in charge decides, and its end closes the pipe. Only a program's first
+    # thread may set this, and only that thread is interrupted.
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     from solver import backend
@@ -284,7 +284,7 @@ def _work(pipe: Connection) -> None:
 
     None is answered by None: what came before is done.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # at once: what follows is imported for a second
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # at once: the imports that follow take a second
     from solver.pours.run import run_job
 
     rooms, begun = Rooms(), False
@@ -308,7 +308,7 @@ def _work(pipe: Connection) -> None:
 
 
 def _end_with_parent() -> None:
-    """End this process where the one in charge was killed: nobody waits for its pour, which may take hours more."""
+    """End this process if the one in charge was killed: nobody waits for its pour, which may take hours more."""
     in_charge = mp.parent_process()
     if in_charge is not None and not in_charge.is_alive():
         raise SystemExit
@@ -316,16 +316,16 @@ def _end_with_parent() -> None:
 
 @dataclass(frozen=True)
 class Room:
-    """What a worker has to have room for: as much as many scenes need, told by a few kilobytes."""
+    """The room that a worker must have: as much as many scenes need, described in a few kilobytes."""
 
     sizes: Capacity
-    """Of one world that holds any of the scenes."""
+    """Sizes of one world that holds any of the scenes."""
     kinds: tuple[Scene, ...]
     """A scene for each kind of kernels, by what is compiled in."""
 
     @staticmethod
     def of(scenes: Sequence[Scene]) -> Room:
-        """That of ``scenes``."""
+        """The room for ``scenes``."""
         from solver.engine.world import compiled_in
         from solver.pours.run import sizes_for
 
@@ -344,7 +344,7 @@ class Rooms:
         self._batches: dict[tuple[str, bool, bool], Batch] = {}
 
     def make(self, room: Room) -> list[Capacity]:
-        """Make ``room``, and leave what is there; returns the sizes of its batches."""
+        """Make ``room``, and keep what is there; returns the sizes of its batches."""
         self._capacity = room.sizes if self._capacity is None else self._capacity.joined(room.sizes)
         # Without effects first: kernels depend on what was allocated before.
         return sorted(

@@ -1,4 +1,4 @@
-"""Rigs: one file per rig, listed here. Into ``RIGS`` bodies are poured, ``BENCH_RIGS`` measure a single body."""
+"""Rigs: one file per rig, listed here. Bodies are poured into ``RIGS``; ``BENCH_RIGS`` measure a single body."""
 
 from solver.plugins import Registry, derived_from
 from solver.rigs.compression import Compression
@@ -21,7 +21,7 @@ BENCH_RIGS: dict[str, type[BenchRig]] = {
     "drop_plate_45": DropPlate45,
     "compression": Compression,
 }
-"""One per bench test; what is measured in it is a file of ``solver/single_body``."""
+"""One per bench test; the measurement itself is a file of ``solver/single_body``."""
 
 __all__ = [
     "BENCH_RIGS",

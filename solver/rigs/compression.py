@@ -4,9 +4,9 @@
     shear     dF_t/du = 8 G* a per contact, a = √(R δ), u half of the shift of the upper plate       →  G*
 
 The specimen is a ball of the body's volume, because a Hertzian contact needs a radius; it is held so that it cannot
-roll, and gravity is off, as a scale is tared. ``single_body/compression.py`` runs the test. Bodies here are rigid with
-Hertzian contacts: there is no elastic cube whose stress over strain is a modulus, and what the paper's Equation (1)
-gives depends on how far one presses.
+roll, and gravity is off, as if the scale were tared. ``single_body/compression.py`` runs the test. Bodies here are
+rigid with Hertzian contacts: there is no elastic cube whose stress over strain would be a modulus, and the result of
+the paper's Equation (1) depends on how far the ball is compressed.
 Source of the test: Processes 2022, 10, 185, §2.3; Hertz 1882; Mindlin 1949.
 """
 
@@ -30,7 +30,7 @@ class Compression(BenchRig):
     wall: str = "rigid_sieve_plate"
     domain_half_width: float = 100.0
     gap: float = 0.01
-    """Distance of the plates at the beginning [m]: the test sets it to the thickness of its specimen."""
+    """Initial distance of the plates [m]: the test sets it to the thickness of its specimen."""
 
     name = "compression"
     surface_names = ("lower", "upper")

@@ -8,9 +8,9 @@ it and a pile forms below.
            /\\
     ──────/──\\───────────  plate, z = 0
 
-Two angles and the flow between them from one run: the slope that stays above (an angle of internal shear) and the pile
-below. Front and back walls, ``depth`` apart, reach down to the plate, so that both are plane; the plate is open to the
-sides. Source of the test: Roessler et al. 2019, Powder Technology 343:803; dimensions are ours.
+One run gives two angles and the flow between them: the slope that remains above (an angle of internal shear) and the
+pile below. Front and back walls, ``depth`` apart, reach down to the plate, so that slope and pile are plane; the plate
+is open to the sides. Source of the test: Roessler et al. 2019, Powder Technology 343:803; dimensions are ours.
 """
 
 from __future__ import annotations

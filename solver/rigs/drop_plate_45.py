@@ -5,8 +5,9 @@
            \\  → v_x, ↑ v_z          outgoing  v·n = (v_x + v_z)/√2
             \\
 
-so that e = (v_x + v_z)/√(2gH) for any friction, as long as the contact is central. The paper measures instead how far L
-the body flies until it is H below the plate, and takes e = L/(2H), which holds for a horizontal rebound only.
+so that e = (v_x + v_z)/√(2gH) for any friction, as long as the contact is central. The paper instead measures the
+distance L that the body flies until it is H below the plate, and takes e = L/(2H), which holds for a horizontal rebound
+only.
 ``single_body/drop_plate_45.py`` runs the test and reports both.
 Source of the test: Processes 2022, 10, 185, §2.5, Equations (4)–(7); H is 20 cm there.
 """

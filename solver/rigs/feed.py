@@ -1,4 +1,4 @@
-"""Where bodies enter a rig: the opening above which they are put, whole bodies inside it.
+"""Where bodies enter a rig: the opening above which they are placed, entirely within its outline.
 
 ``reach`` is ``insertion.region_radius`` throughout: it narrows the opening, so that a feed can be a thin stream.
 """

@@ -7,7 +7,7 @@
          |outlet  |        ↑ outlet_height
     ─────────────────────  plate, z = 0
 
-The plate is infinite; bodies that roll further than ``domain_half_width`` from the axis are taken out and counted.
+The plate is infinite; bodies that roll further than ``domain_half_width`` from the axis are removed and counted.
 Source of the shipped dimensions: Processes 2022, 10, 185, §2.6 (funnel); the outlet height is assumed, not published.
 """
 
@@ -88,8 +88,8 @@ class Funnel(PourRig):
     def check(self, widest_body: float) -> None:
         """Refuse a funnel that narrows upward or whose outlet is narrower than ``widest_body`` [m].
 
-        ``widest_body`` is the smallest width through which the widest of the bodies can pass (its middle extent
-        may turn, its two smaller extents have to go through).
+        ``widest_body`` is the smallest width through which the widest of the bodies can pass: its middle extent,
+        since a body may turn and only its two smaller extents have to go through.
         """
         if self.inlet_diameter <= self.outlet_diameter:
             raise ParameterError(

@@ -1,7 +1,7 @@
 """The inclined plane: a body lies on a plane that is tilted slowly, until it slides. The tangent of that angle is μ_s.
 
-The body is held so that it cannot roll or tip, as in a laboratory, where several grains are glued to a carrier. In the
-frame of the plane gravity turns, and that is what is done; ``single_body/inclined_plane.py`` runs the test.
+The body is held so that it cannot roll or tip, as in a laboratory, where several grains are glued to a carrier. The
+test turns gravity, in the frame of the plane, instead of the plane; ``single_body/inclined_plane.py`` runs it.
 Source of the test: Processes 2022, 10, 185, §2.4.
 """
 

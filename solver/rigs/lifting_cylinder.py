@@ -6,8 +6,9 @@
        |________|   ↓
     ─────────────────────  plate, z = 0
 
-A slow rig: the material flows out at the bottom edge without falling, so that a pile shows friction where a funnel
-shows impacts. The plate is infinite; bodies that roll further than ``domain_half_width`` from the axis are taken out.
+The test is slow: the material flows out at the bottom edge without falling, so that its pile shows friction where that
+of a funnel shows impacts. The plate is infinite; bodies that roll further than ``domain_half_width`` from the axis are
+removed.
 Source: Roessler & Katterfeld 2019, Particuology 45:17 (angle of repose test); dimensions are ours.
 """
 
@@ -74,7 +75,7 @@ class LiftingCylinder(PourRig):
         return RoundFeed(self.cylinder_height, self.diameter / 2.0)
 
     def container(self, since: float) -> Container:
-        """Above the lower edge of the cylinder, which rises, within its radius."""
+        """Above the rising lower edge of the cylinder, within its radius."""
         return Container(min(self.lift_speed * since, self.lift_height), self.diameter / 2.0)
 
     @property

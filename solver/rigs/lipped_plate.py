@@ -6,10 +6,10 @@
     ─────────────────────  plate, z = 0
      ← lip_diameter →
 
-On a bare smooth plate round grains roll away from under their heap: a heap of slope θ and height h pushes its base
-outwards by about K h²/2 per width and ρg (K ≈ 0.3 … 0.5), and half of it weighs h²/(2 tan θ) and is held by no more
-than its rolling friction μ, so that tan θ ≤ μ/K. Behind the lip grains stand on grains. What spills over it rolls away
-and is taken out at ``domain_half_width``.
+On a bare smooth plate, round grains roll away from under their heap. Per width and ρg, a heap of slope θ and height h
+pushes its base outwards with about K h²/2 (K ≈ 0.3 … 0.5), while half of it weighs h²/(2 tan θ) and is held by no more
+than its rolling friction μ, so that tan θ ≤ μ/K. Behind the lip, grains rest on grains. Grains that spill over it roll
+away and are removed at ``domain_half_width``.
 Source: test platforms of USP <1174> and ISO 4324, 100 mm across, whose "protruding outer lip" retains a layer on which
 the cone is formed, the surplus falling off (gardco.com, powder angle of repose). The lip's height is ours.
 """

@@ -1,8 +1,8 @@
 """A funnel from a mesh file: what flows in at its top flows out at its bottom, onto a plate.
 
-The mesh stands with z up, as it is in its file; its outlet, the lowest cut through it, is put above the middle of the
-plate. It may be a thin shell or a solid with walls, round or not. What a body can pass is the largest circle about the
-axis within a cut (:class:`Opening`); the gate that keeps the outlet shut is a disc over all of it.
+The mesh keeps the orientation of its file, with z up; its outlet, the lowest cut through it, is placed above the middle
+of the plate. It may be a thin shell or a solid with walls, round or not. The passage for bodies is the largest circle
+about the axis within a cut (:class:`Opening`); the gate that closes the outlet is a disc over all of it.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 DIRECTIONS = 720
-"""Half degrees in which the wall is looked for from the axis."""
+"""Directions, half a degree apart, in which the wall is looked for from the axis."""
 HAIR = 1e-6
-"""Angle [rad] that segments are longer at either end, so that none looks between two that meet."""
+"""Angle [rad] by which segments are extended at either end, so that no direction passes between two that meet."""
 RIM = 0.005
-"""Share of the mesh's height, from its ends, at which outlet and inlet are looked at."""
+"""Distance of the cuts for outlet and inlet from the ends of the mesh, as a share of its height."""
 MOST_FACES = 20_000
 
 
@@ -59,7 +59,7 @@ class MeshFunnel(PourRig):
 
     @property
     def mesh_file(self) -> Path:
-        """Where the mesh is. Raises ParameterError where there is none any more."""
+        """Path of the mesh. Raises ParameterError if it is not there any more."""
         try:
             return asset_path("meshes", self.mesh)
         except AssetNotFoundError as error:
@@ -67,7 +67,7 @@ class MeshFunnel(PourRig):
 
     @property
     def placed(self) -> Placed:
-        """The mesh as it was read. Raises ParameterError for a file that holds none."""
+        """The mesh as it was read. Raises ParameterError for a file without a mesh."""
         file = self.mesh_file
         return _placed(file, LENGTH_UNITS[self.unit], self.wall, file.stat().st_mtime_ns)
 
@@ -138,18 +138,18 @@ class Placed:
     mesh: TriangleMesh
     height: float
     reach: float
-    """Of its farthest corner from the axis."""
+    """Distance of its farthest corner from the axis."""
     outlet: Opening
     inlet: Opening
     shut: bool
-    """Something stands in the way straight down from the inlet to the outlet."""
+    """Whether something blocks the way straight down from the inlet to the outlet."""
 
 
 @dataclass(frozen=True)
 class Opening:
     """A level cut, seen from the axis: distance of the nearest and of the farthest wall [m].
 
-    closed: whether a wall stands in every direction; otherwise the axis is outside of it.
+    closed: whether there is a wall in every direction; otherwise the axis is outside the opening.
     """
 
     nearest: float
@@ -184,7 +184,7 @@ def middle(segments: Array) -> tuple[float, float]:
 
 
 def shut(mesh: trimesh.Trimesh, axis: tuple[float, float]) -> bool:
-    """Whether a face stands across the vertical line through ``axis`` (x, y): a lid, a bottom, or a wall aslant."""
+    """Whether a face crosses the vertical line through ``axis`` (x, y): a lid, a bottom, or a slanting wall."""
     a, b, c = (mesh.triangles[:, k, :2] - axis for k in range(3))
     turns = np.stack([p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] for p, q in ((a, b), (b, c), (c, a))])
     area = np.abs(turns.sum(axis=0))
@@ -223,6 +223,6 @@ def _all_round(start: Array, end: Array) -> bool:
     first = np.arctan2(start[:, 1], start[:, 0])
     turn = np.arctan2(start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0], (start * end).sum(axis=1))
     looked = np.linspace(-np.pi, np.pi, DIRECTIONS, endpoint=False)
-    # How far each direction is from the first end, in the sense of the segment's own turn; a hair before it counts.
+    # Angle from the first end to each direction, in the segment's own sense of rotation; a hair before it counts.
     ahead = np.mod((looked[:, None] - first[None, :]) * np.where(turn < 0.0, -1.0, 1.0) + HAIR, 2.0 * np.pi)
     return bool((ahead <= np.abs(turn) + 2.0 * HAIR).any(axis=1).all())

@@ -1,9 +1,9 @@
-"""The opening that a rig empties through, seen from above, and what lies across it when nothing moves any more.
+"""The opening that a rig empties through, seen from above, and what lies across it once nothing moves.
 
 A body lies across the outlet if its centre of mass is over the opening, and two parts of it reach the edge, on opposite
-sides of that centre, so that the line between them crosses the opening within 0.71 half widths of its middle (of a
-circle: cuts off more than a quarter turn of the edge). It cannot fall, whatever else is there. What is held by several
-bodies none of which does, along the edge or beside each other, is an arch.
+sides of that centre, so that the line between them crosses the opening within 0.71 half widths of its middle (in a
+circle: cuts off more than a quarter turn of the edge). Such a body cannot fall, whatever else is there. Several bodies
+that hold material although none of them lies across, along the edge or beside each other, form an arch.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 EDGE = 0.99
-"""Share of the half width from which on a body reaches the edge: one between upright walls just touches them."""
+"""Share of the half width from which a body reaches the edge: one between upright walls just touches them."""
 CHORD = 0.5**0.5
-"""Share of the half width within which its line passes the middle."""
+"""Largest distance of the line from the middle, as a share of the half width."""
 
 
 class Outlet(Protocol):
     """An opening about the z axis."""
 
     def across(self, place: Array) -> Array:
-        """``place`` (n, 2) [m] without what lies along the opening, shape (n, 1 or 2): its length counts."""
+        """Components of ``place`` (n, 2) [m] across the opening, shape (n, 1 or 2); their norm counts."""
         ...
 
     @property
@@ -66,12 +66,12 @@ class Obstruction:
 
     component: str
     mass: float
-    """Its own [kg]."""
+    """Mass of the body itself [kg]."""
     above: float
-    """Of the other bodies over the outlet [kg]; in a rig that is to be empty, of all that are in it."""
+    """Mass of the other bodies over the outlet [kg]; in a rig that is meant to empty, of all other bodies in it."""
     height: float = 0.0
-    """Of its lowest point over the edge [m] where that is more than the outlet's half width: it is wedged between
-    walls; 0 where it is at the outlet."""
+    """Height of its lowest point above the edge [m] if that is more than the outlet's half width: it is wedged between
+    walls. 0 if it is at the outlet."""
 
 
 def obstruction(
@@ -82,8 +82,8 @@ def obstruction(
     ``spheres``: the member spheres of ``bodies``. ``held``: which bodies are in the container, shape (n,). ``keeps``:
     whether bodies beside the outlet belong there, so that only those over it are held up.
 
-    A body across the outlet that lies on others which hang lower is part of an arch, and is none. Its centre of mass
-    may be just below the edge: the parts of it that bear on the edge are not.
+    A body across the outlet that rests on others which hang lower is part of an arch and does not count. The centre of
+    mass of the body may be just below the edge, since the parts of it that bear on the edge are not.
     """
     over = np.linalg.norm(outlet.across(bodies.position[:, :2]), axis=1) < outlet.half_width
     lowest = np.full(bodies.mass.size, np.inf)
@@ -107,7 +107,7 @@ def obstruction(
 def _reaches_both_sides(outlet: Outlet, place: Array, radius: Array, middle: Array) -> bool:
     """Whether discs at ``place`` (n, 2) of ``radius`` (n,) [m] reach the edge on opposite sides of ``middle`` (2,).
 
-    And whether the line between them crosses the opening.
+    The line between them must also cross the opening.
     """
     from_middle = outlet.across(place)
     at_edge = np.linalg.norm(from_middle, axis=1) + radius >= EDGE * outlet.half_width

@@ -1,9 +1,9 @@
-"""What the rest of the program asks of a rig. A new rig is one file with one frozen dataclass and one line in ``RIGS``,
-or an entry point ``rig.NAME`` of a package of one's own (``solver/plugins.py``).
+"""What the rest of the program expects of a rig. A new rig is one file with one frozen dataclass and one line in
+``RIGS``, or an entry point ``rig.NAME`` in your own package (``solver/plugins.py``).
 
 Bodies are poured into every rig in the same way (``solver/pours/pour.py``): the rig is filled, the fill settles, the
 rig acts (a gate opens, a cylinder is lifted, a drum begins to turn), and the run ends, at rest or after a given time.
-All of it is decided at the moments at which a pour is sampled, so that a seed repeats a run bit by bit.
+All of this is decided at the moments at which a pour is sampled, so that a seed repeats a run bit for bit.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ OUTLET_HEIGHTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
         "outlet at twice the height": {"rig.outlet_height": 2.0},
     }
 )
-"""Changes (``PourRig.quick_changes``) of a rig that is hung over its plate."""
+"""Changes (``PourRig.quick_changes``) of a rig that hangs above its plate."""
 
 PILE = "pile"
 """Group of the observables of a free pile on the plate, whatever made it."""
 DISCHARGE = "discharge"
-"""Those of the flow out of a container."""
+"""Group of the observables of the flow out of a container."""
 FREE_SURFACE = "free_surface"
-"""Those of the surface of a bed in motion."""
+"""Group of the observables of the surface of a bed in motion."""
 DRAW_DOWN = "draw_down"
-"""Those of what stays above a slot."""
+"""Group of the observables of the material that remains above a slot."""
 
 
 @dataclass(frozen=True)
@@ -48,14 +48,14 @@ class Container:
 
 
 EVERYWHERE = Container(-math.inf, math.inf)
-"""The inside of a rig without an outside."""
+"""Container of a rig that has no outside."""
 NOWHERE = Container(math.inf, 0.0)
-"""The inside of a rig without an inside."""
+"""Container of a rig that has no inside."""
 
 
 @dataclass(frozen=True)
 class Switch:
-    """Put surface number ``surface`` there or take it away, ``after`` [s] from when the rig begins to act."""
+    """Switch surface number ``surface`` on or off, ``after`` [s] after the rig begins to act."""
 
     after: float
     surface: int
@@ -64,8 +64,8 @@ class Switch:
 
 @dataclass(frozen=True)
 class Move:
-    """Let surface number ``surface`` move from ``after`` [s] on: its origin at ``velocity`` [m/s], the surface about it
-    at ``angular_velocity`` [rad/s], both in the world."""
+    """Move surface number ``surface`` from ``after`` [s] on: its origin at ``velocity`` [m/s], the surface about its
+    origin at ``angular_velocity`` [rad/s], both in world coordinates."""
 
     after: float
     surface: int
@@ -78,7 +78,7 @@ Action = Switch | Move
 
 @dataclass(frozen=True)
 class Watch:
-    """Keep the free surface at every sample from ``after`` [s] on: |x| up to ``half_width``, y from ``height`` [m]."""
+    """Record the free surface at each sample from ``after`` [s] on: |x| up to ``half_width``, y from ``height`` [m]."""
 
     after: float
     half_width: float
@@ -90,7 +90,7 @@ class Rig(Protocol):
 
     @property
     def name(self) -> str:
-        """As it is written in files and on the command line."""
+        """Name used in files and on the command line."""
         ...
 
     @property
@@ -100,12 +100,12 @@ class Rig(Protocol):
 
     @property
     def domain_half_width(self) -> float:
-        """Bodies with |x| or |y| beyond this are taken out [m]."""
+        """Bodies with |x| or |y| beyond this are removed [m]."""
         ...
 
     @property
     def surface_names(self) -> tuple[str, ...]:
-        """Names of ``surfaces()``, in order. One called ``gate`` is there only until the rig acts."""
+        """Names of ``surfaces()``, in order. A surface called ``gate`` is there only until the rig acts."""
         ...
 
     @property
@@ -114,7 +114,7 @@ class Rig(Protocol):
         return NOTHING
 
     def surfaces(self) -> tuple[Surface, ...]:
-        """Plate, walls, gates; where they stand before the rig acts."""
+        """Plate, walls and gates, where they are before the rig acts."""
         ...
 
     def container(self, since: float) -> Container:
@@ -122,9 +122,9 @@ class Rig(Protocol):
         ...
 
     def check(self, widest_body: float) -> None:
-        """Raise ParameterError where dimensions do not fit together.
+        """Raise ParameterError if dimensions do not fit together.
 
-        ``widest_body`` [m] is the smallest width that all of the bodies can pass: their middle extent, as a body may
+        ``widest_body`` [m] is the smallest width that all of the bodies can pass: their middle extent, since a body may
         turn and only its two smaller extents have to go through.
         """
         ...
@@ -135,12 +135,12 @@ class BareRig(Rig, Protocol):
 
     @property
     def name(self) -> str:
-        """Not one that can be asked for."""
+        """Not a name that can be requested."""
         return "bare"
 
     @property
     def surface_names(self) -> tuple[str, ...]:
-        """Numbers."""
+        """The surfaces' numbers."""
         return tuple(str(k) for k in range(len(self.surfaces())))
 
     def container(self, since: float) -> Container:
@@ -166,7 +166,7 @@ class PourRig(Rig, Protocol):
 
     @property
     def gives(self) -> tuple[str, ...]:
-        """What is read off a run by default: groups of observables, and the names of single ones beside them."""
+        """What is read from a run by default: groups of observables, and names of single observables."""
         ...
 
     @property
@@ -176,12 +176,12 @@ class PourRig(Rig, Protocol):
 
     @property
     def refills(self) -> bool:
-        """Whether what did not fit in goes on entering while the rig acts. Otherwise a rig too full is a jam."""
+        """Whether bodies that did not fit in keep entering while the rig acts. Otherwise an overfull rig is a jam."""
         return False
 
     @property
     def leaves_heap(self) -> bool:
-        """Whether a heap's angle of repose is asked for: a flat layer is then no result (``Outcome.NO_HEAP``)."""
+        """Whether a heap's angle of repose is wanted: a flat layer is then no result (``Outcome.NO_HEAP``)."""
         return PILE in self.gives
 
     @property
@@ -191,7 +191,7 @@ class PourRig(Rig, Protocol):
 
     @property
     def keeps_material(self) -> bool:
-        """Whether what stays in the container at rest belongs to the result. Otherwise it is a jam."""
+        """Whether material left in the container at rest belongs to the result. Otherwise it is a jam."""
         return False
 
     @property
@@ -211,15 +211,15 @@ class PourRig(Rig, Protocol):
 
     @property
     def quick_changes(self) -> Mapping[str, Mapping[str, float]]:
-        """What a laboratory can change of it within minutes: name → parameter path → factor.
+        """Changes that a laboratory can make to it within minutes: name → parameter path → factor.
 
-        A diagnosis that cannot tell two answers apart looks among these for the experiment that would.
+        A diagnosis that cannot tell two answers apart looks among these for an experiment that can.
         """
         return {}
 
     @property
     def forgets(self) -> tuple[str, ...]:
-        """Paths of parameters of any rig that leave no trace in what is read off this one; a diagnosis changes none of
+        """Paths of parameters of any rig that do not affect what is read from this one; a diagnosis changes none of
         them to tell answers apart.
         """
         return ()

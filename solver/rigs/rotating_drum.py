@@ -7,9 +7,9 @@
       \\    '. /
        '-___-'
 
-Thin (``axial_length`` of some bodies) it is the quasi-two-dimensional drum of powder testers; long, the drum of a kiln.
-The end plates are walls and turn with the shell, or stand still. The filled volume counts the pores between the bodies;
-it becomes a mass by the density of the solid and an assumed ``packing``.
+A thin drum (``axial_length`` of a few bodies) is the quasi-two-dimensional drum of powder testers; a long one is the
+drum of a kiln. The end plates are walls that turn with the shell or stand still. The filled volume includes the pores
+between the bodies; the density of the solid and an assumed ``packing`` convert it into a mass.
 Source of the instrument: Lumay et al. 2012, Powder Technology 224:19; its cell is 84 mm wide.
 """
 
@@ -29,8 +29,8 @@ FEED_BOTTOM, FEED_WIDTH, FEED_TOP = 0.1, 0.6, 0.75
 """The feed: between these heights above the axis and within this half width, in radii of the drum. Its upper corners
 lie 0.96 radii from the axis."""
 TURNED_OVER = 0.5
-"""Turns after which the filling is forgotten. Of 89 beads in a drum of 16 bead diameters, fed at 0.4 and 4 times the
-rate, the angle after half a turn shows no trend: + 0.7° and + 0.6° with standard errors of 0.4° and 0.5°."""
+"""Turns after which the way of filling no longer matters. For 89 beads in a drum of 16 bead diameters, fed at 0.4 and 4
+times the rate, the angle after half a turn shows no trend: + 0.7° and + 0.6° with standard errors of 0.4° and 0.5°."""
 MOST_FILLED = 0.5
 """Largest share of the drum's volume that may be filled: the feed is above the axis."""
 
@@ -65,7 +65,7 @@ class RotatingDrum(PourRig):
 
     @property
     def forgets(self) -> tuple[str, ...]:
-        """How it was fed, once every body of a bed of up to half the drum has been through the flowing layer."""
+        """The settings of the feed, once every body of a bed of up to half the drum has been in the flowing layer."""
         return ("insertion.rate", "insertion.drop_speed") if self.transient_turns >= TURNED_OVER else ()
 
     @property

@@ -80,7 +80,7 @@ def horizontal(height: float, material: str) -> Plane:
 
 
 def turned_plane(origin: Point, quaternion: Quaternion, material: str) -> Plane:
-    """A plane through ``origin`` [m] whose side with bodies is the turned local +z."""
+    """A plane through ``origin`` [m] with the bodies on the side of its turned local +z."""
     return Plane(material, SurfacePose(origin, quaternion))
 
 

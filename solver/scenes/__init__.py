@@ -1,1 +1,1 @@
-"""What is declared of a pour: bodies, materials, contacts and settings, and their files. NumPy only."""
+"""The declaration of a pour: bodies, materials, contacts and settings, and their files. NumPy only."""

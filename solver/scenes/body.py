@@ -16,7 +16,7 @@ from solver.shapes.solid import Solid, mass_properties
 
 
 class _SphereNumber(Parameter):
-    """A choice of resolutions that a number of spheres may stand in for."""
+    """A choice of resolutions, in place of which a number of spheres may be given."""
 
     def check(self, value: Any) -> str:
         """The name of a resolution, or a whole number as text."""
@@ -29,7 +29,7 @@ class _SphereNumber(Parameter):
 
 
 TOTAL_TOLERANCE = 1e-6
-"""By which mass fractions may miss 1 in all."""
+"""Largest deviation of the sum of the mass fractions from 1."""
 SPHERES = _SphereNumber(
     "body.spheres", "1", 0, 0, f"Member spheres per body; also a number, 1 … {MOST_SPHERES}.", choices=RESOLUTIONS
 )
@@ -56,11 +56,11 @@ class Members:
     mass: float
     inertia: tuple[float, float, float]
     density: float | None = None
-    """At which mass and inertia hold [kg/m³]: they follow the material's. Without it they stay as declared."""
+    """Density for which mass and inertia hold [kg/m³]: they scale with the material's. None: they stay as declared."""
     drawn: Solid | None = None
     """The surface to draw instead of the spheres, in the same frame."""
     fit: ClumpFit | None = None
-    """How well the spheres stand for the solid that they were fitted to; without it they are the body itself."""
+    """How well the spheres represent the solid that they were fitted to; None: they are the body itself."""
 
     def heavier(self, density: float) -> float:
         """Factor by which mass and inertia grow in a material of ``density`` [kg/m³]."""
@@ -76,11 +76,11 @@ class Body:
     mass_fraction: float
     shape: Solid | Members
     density: float
-    """That of the material [kg/m³]; :func:`with_densities` keeps the two equal."""
+    """Density of the material [kg/m³]; :func:`with_densities` keeps the two equal."""
     spheres: str = "standard"
     """Member spheres of a solid: a resolution, or their number as text."""
     sizes: SizeDistribution = SizeDistribution()
-    """Scale of the bodies poured; everything else here is that of a body of the declared size."""
+    """Scale of the bodies poured; all other attributes are those of a body of the declared size."""
 
     @property
     def clump(self) -> Clump:
@@ -178,9 +178,9 @@ def with_densities(bodies: tuple[Body, ...], materials: tuple[Material, ...]) ->
 def counts(bodies: tuple[Body, ...], mass: float) -> tuple[int, ...]:
     """Number of bodies of each component in ``mass`` [kg], by largest remainder on the number fractions.
 
-    The number total is mass divided by the mean mass of a body, Σ fᵢ / Σ (fᵢ/mᵢ) with mᵢ = :attr:`Body.mean_mass`,
-    rounded; quotas are number fractions times that total. The same for every seed. A component with a positive share
-    gets at least one body.
+    The total number is the mass divided by the mean mass of a body, Σ fᵢ / Σ (fᵢ/mᵢ) with mᵢ = :attr:`Body.mean_mass`,
+    rounded; quotas are number fractions times that total. The counts are the same for every seed. A component with a
+    positive share gets at least one body.
     """
     per_mass = [body.mass_fraction / body.mean_mass for body in bodies]
     total = max(1, round(mass * sum(per_mass)))
@@ -193,7 +193,7 @@ def counts(bodies: tuple[Body, ...], mass: float) -> tuple[int, ...]:
 
 
 def _with_fraction(bodies: tuple[Body, ...], name: str, new: float) -> tuple[Body, ...]:
-    """The other shares scale with it; where they are all zero, they share the rest equally."""
+    """``bodies`` with one share replaced; the others scale to the rest, or share it equally if all are zero."""
     if len(bodies) == 1 and not math.isclose(new, 1.0, abs_tol=TOTAL_TOLERANCE):
         raise ParameterError(f"body.{name}.mass_fraction: {new:g}, but there is no other component; allowed: 1")
     others = sum(body.mass_fraction for body in bodies if body.name != name)

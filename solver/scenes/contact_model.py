@@ -1,10 +1,10 @@
-"""The contact law of a scene, and the conventions by which programs that share a law still differ.
+"""The contact law of a scene, and the conventions in which programs with the same law still differ.
 
-The defaults are those of files that name none. EDEM and LIGGGHTS calculate with ``body_mass``; LIGGGHTS's ``tangential
-history`` with ``mindlin`` and ``uncapped``.
+The defaults apply to files that name none. EDEM and LIGGGHTS use ``body_mass``; LIGGGHTS's ``tangential history`` uses
+``mindlin`` and ``uncapped``.
 
     law                 which force acts (``laws/``)
-    clump_rule          what of a clump of spheres a contact feels (``engine/kernels/narrowphase.py``)
+    clump_rule          which mass of a clump of spheres acts at a contact (``engine/kernels/narrowphase.py``)
     tangential_law      what happens to the tangential spring when the contact area changes (``laws/hertz_mindlin.py``)
     tangential_dashpot  whether Coulomb's limit holds for spring and dashpot together or for the spring alone
 """
@@ -61,22 +61,22 @@ class ContactModel:
 
     @property
     def shares(self) -> bool:
-        """Whether contacts of one pair of bodies share, which kernels have to be compiled for."""
+        """Whether all contacts of a pair of bodies act as one, for which kernels have to be compiled separately."""
         return self.clump_rule == "local_mass_shared"
 
     @property
     def stated(self) -> dict[str, str]:
-        """The law and what of its conventions matters to it, by name: for whoever repeats a run."""
+        """The law and the conventions that matter to it, by name: what is needed to repeat a run."""
         names = ("law", "clump_rule", *CONTACT_LAWS[self.law].reads, "tangential_dashpot")
         return {name: str(getattr(self, name)) for name in names}
 
     def carries(self, effect: str) -> bool:
-        """Whether the effect of that name may act beside the law."""
+        """Whether the effect of that name may act together with the law."""
         return effect not in CONTACT_LAWS[self.law].refuses
 
     @property
     def places(self) -> dict[str, int]:
-        """Places of the conventions in their lists of choices, as the kernels take them."""
+        """Index of each convention in its list of choices, as the kernels take it."""
         return {
             "clump_rule": CLUMP_RULES.index(self.clump_rule),
             "tangential_law": TANGENTIAL_LAWS.index(self.tangential_law),

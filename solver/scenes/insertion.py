@@ -1,8 +1,8 @@
 """Insertion: when and where bodies enter. A body is placed only where it fits; if the inlet is full it waits.
 
-Bodies start above the feed opening of the rig (``rigs/feed.py``), whole bodies inside it, at a constant mass rate, with
-uniformly random orientation and a downward speed, to which they add what they fall until the opening (1.1 m/s over
-60 mm). Order, orientations and places come from one NumPy generator per run, so a seed repeats a run.
+Bodies start above the feed opening of the rig (``rigs/feed.py``), entirely within its outline, at a constant mass rate,
+with uniformly random orientation and a downward speed, to which the fall to the opening adds (1.1 m/s over 60 mm).
+Order, orientations and places come from one NumPy generator per run, so a seed repeats a run.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Array = npt.NDArray[np.float64]
 
 PROTOCOLS = ("pour_through", "fill_then_open")
 TRIES = 40
-"""Random poses that are tried for one body before it waits for the next moment."""
+"""Number of random places that are tried for one body before it waits for the next moment of decision."""
 
 
 @dataclass(frozen=True)

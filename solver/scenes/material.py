@@ -1,4 +1,4 @@
-"""Materials and pairs of materials: what a contact law is told, without the law."""
+"""Materials and pairs of materials: the input of a contact law, without the law itself."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Pair:
     )
 
     def joins(self, a: str, b: str) -> bool:
-        """True if this pair is about ``a`` and ``b``, in either order."""
+        """True if this is the pair of ``a`` and ``b``, in either order."""
         return {self.a, self.b} == {a, b}
 
 

@@ -1,6 +1,6 @@
-"""Material files: TOML → :class:`Scene`, and set-up tables that lie over a material in other files.
+"""Material files: TOML → :class:`Scene`, and set-up tables in other files that override those of a material.
 
-:class:`MaterialFile` and :class:`BodyTable` say what may stand where. Keys of a set-up table are the last parts of
+:class:`MaterialFile` and :class:`BodyTable` define which keys are allowed. Keys of a set-up table are the last parts of
 parameter paths (``outlet_height`` in ``[rig]`` is ``rig.outlet_height``); ``name`` in ``[rig]`` chooses the rig.
 
 Measured diameters of a component give the spread of its log-normal sizes about the declared one:
@@ -8,8 +8,8 @@ Measured diameters of a component give the spread of its log-normal sizes about 
 size = { mean = 1.212e-3, sd = 0.139e-3 }                              spread = sd / mean
 size = { quantiles = { p05 = 1.105e-3, p50 = 1.204e-3, p95 = … } }     spread = √(exp t² − 1)
 
-t is the slope of ln(quantile) over the quantile's normal deviate, by least squares: exact for log-normal sizes. Where
-both stand, mean and sd count. Only the *relative* spread is taken.
+t is the slope of ln(quantile) over the quantile's normal deviate, by least squares: exact for log-normal sizes. If
+both are given, mean and sd are used. Only the *relative* spread is used.
 Source: moments and quantiles of the log-normal distribution, Johnson, Kotz & Balakrishnan 1994, ch. 14.
 """
 
@@ -58,16 +58,16 @@ from solver.toml_file import (
 )  # fmt: skip
 
 SET_UP = ("rig", "insertion", "numerics", "contact", "effect")
-"""Tables that may lie over a material in any file."""
+"""Tables that may override those of a material in any file."""
 MESH = "rig.mesh"
 """Path of the parameter that names a file."""
 LEAST_EXTENT, LARGEST_EXTENT = 1e-6, 100.0
-"""Longest outer dimension of a body [m]."""
+"""Limits of the longest outer dimension of a body [m]."""
 LIGHTEST, HEAVIEST = 1e-2, 1e5
-"""Mass of a body by its spheres over the volume of the ball around them [kg/m3]. They may fill a hundredth of it, and
-be a third of the true shape."""
+"""Limits of the mass of a body declared by its spheres, over the volume of the ball around them [kg/m3]. The spheres
+may fill only a hundredth of the ball, and be only a third of the true shape."""
 SMALLEST_MOMENT, LARGEST_MOMENT = 1e-9, 100.0
-"""Moments over mass times the ball's radius squared: of a hair, and of a needle that one sphere stands for."""
+"""Limits of the moments over mass times the ball's radius squared: a hair, and a needle represented by one sphere."""
 QUANTILE = re.compile(r"p(\d{1,2}(?:\.\d+)?)")
 SPHERES_BY_HAND = ("sphere_centres", "sphere_radii", "mass", "inertia", "density", "mesh", "unit", "fit")
 ELASTIC = ("youngs_modulus", "shear_modulus", "poisson_ratio")
@@ -186,7 +186,7 @@ class MaterialFile(TomlTable):
 
 
 def load_material(name: str, relative_to: Path | None = None) -> Scene:
-    """Scene from a shipped material's name or a material file's path, in the funnel unless the file says else."""
+    """Scene from a shipped material's name or a material file's path, in the funnel unless the file names a rig."""
     path = asset_path("materials", name, relative_to=relative_to)
     with naming_file(path, ParameterError, ShapeError):
         return scene_from(read_toml(path), path)
@@ -197,7 +197,7 @@ FILE_KEYS = ("file", "mesh")
 
 
 def files_named_in(table: Mapping[str, Any]) -> Iterator[object]:
-    """What a parsed material file names as files, be it well-formed or not."""
+    """The files that a parsed material file names, whether or not it is well-formed."""
     bodies = table.get("body")
     tables = [table.get("rig"), *(bodies if isinstance(bodies, list) else [bodies])]
     for one in [entry for entry in tables if isinstance(entry, dict)]:
@@ -248,9 +248,9 @@ def scene_from(table: dict[str, Any], path: Path) -> Scene:
 
 
 def with_set_up(scene: Scene, table: Mapping[str, Any], folder: Path | None = None) -> Scene:
-    """``scene`` with the set-up tables in ``table``, a parsed file whose other keys are of no concern here.
+    """``scene`` with the set-up tables in ``table``, a parsed file whose other keys are ignored here.
 
-    A relative path in it, such as the mesh of a rig, starts in ``folder``; None: the working directory.
+    A relative path in it, such as the mesh of a rig, is relative to ``folder``; None: to the working directory.
     """
     values: dict[str, Any] = {}
     for kind in SET_UP:
@@ -272,7 +272,7 @@ def _by_path(prefix: str, entries: Mapping[str, Any]) -> Iterator[tuple[str, Any
 
 
 def with_settings(scene: Scene, values: Mapping[str, Any]) -> Scene:
-    """``scene`` with parameters replaced by path (:func:`with_values`), ``rig.name`` before them."""
+    """``scene`` with parameters replaced by path (:func:`with_values`), ``rig.name`` first."""
     settings = dict(values)
     name = settings.pop("rig.name", scene.rig.name)
     if name != scene.rig.name:
@@ -366,7 +366,7 @@ def _body(entry: Settings, materials: tuple[Material, ...], path: Path) -> Body:
 
 
 def _taken_in(entry: Settings, path: Path) -> tuple[Settings, Path]:
-    """The table with those of its body file below it, and the file that paths in it are relative to."""
+    """The table, completed by that of its body file, and the file that its paths are relative to."""
     if "file" not in entry:
         return entry, path
     own = path.parent / str(entry["file"])
@@ -427,7 +427,7 @@ def _members(table: BodyTable, where: str, path: Path) -> Members:
 
 
 def _check_members(body: Body, shape: Members, where: str) -> None:
-    """Refuse mass and moments that no body has which these spheres stand for: they are in another unit."""
+    """Refuse mass and moments that no body of these spheres can have: they must be in another unit."""
     radius = math.hypot(*body.extents) / 2.0
     volume, moment = 4.0 / 3.0 * math.pi * radius**3, body.mass * radius**2
     if not LIGHTEST * volume <= body.mass <= HEAVIEST * volume:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from solver.params import param
 
 REST_SPEED = 2e-3
-"""Below it [m/s] a body counts as lying still, where nothing else is asked for."""
+"""Default speed [m/s] below which a body counts as at rest."""
 ROLLING_SLOPE = 0.01
-"""A single body on the plate whose path is no steeper than this rolls, for ever; others tumble and come to rest."""
+"""A lone body on the plate whose path is no steeper than this rolls on for ever; others tumble and come to rest."""
 
 
 @dataclass(frozen=True)

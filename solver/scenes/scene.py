@@ -10,9 +10,10 @@ Parameter paths (the same grammar in ``--set``, study files, sliders and the sto
     rig.<name>   insertion.<name>   numerics.<name>   contact.<name>
     effect.<effect>.<name>                               (of ``solver/effects/``; all off at first)
 
-Which rig it is (``rig.name`` in files and ``--set``) is no parameter: another rig has others (:func:`with_rig`).
+The choice of the rig (``rig.name`` in files and ``--set``) is not a parameter, because each rig has its own parameters
+(:func:`with_rig`).
 
-A scene is the declared one; :func:`actual` carries out its effects of material and set-up.
+A scene is as declared; :func:`actual` applies its effects on material and set-up.
 """
 
 from __future__ import annotations
@@ -50,9 +51,9 @@ class Scene:
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     assumed: tuple[str, ...] = ()
     effects: tuple[Effect, ...] = ()
-    """Those whose parameters differ from their defaults, in the order of ``EFFECTS``."""
+    """Effects whose parameters differ from their defaults, in the order of ``EFFECTS``."""
     axis: tuple[float, float] = (0.0, 0.0)
-    """Where the rig's axis stands on the plate, as measured there [m]."""
+    """Position of the rig's axis on the plate, as measured there [m]."""
 
     def effect(self, name: str) -> Effect:
         """The effect of that name; with its default parameters it is off."""
@@ -72,7 +73,7 @@ class Scene:
         return self.with_effect(EFFECTS[name]())
 
     def material(self, name: str) -> Material:
-        """The material of that name, or :class:`ParameterError` naming the ones there are."""
+        """The material of that name, or :class:`ParameterError` naming the known ones."""
         for material in self.materials:
             if material.name == name:
                 return material
@@ -87,7 +88,7 @@ class Scene:
         raise ParameterError(f"pair.{a}.{b}: no such pair; known: {known}")
 
     def contact_pair(self, one: Body, other: Body | str) -> Pair:
-        """The pair that rules a contact: by body names first, then by material names."""
+        """The pair that applies to a contact: by body names first, then by material names."""
         names = [(one.name, one.material)]
         names.append((other, other) if isinstance(other, str) else (other.name, other.material))
         for a in names[0]:
@@ -197,7 +198,7 @@ def with_values(scene: Scene, values: dict[str, Any]) -> Scene:
 
 
 def check(scene: Scene) -> None:
-    """Raise :class:`ParameterError` where the parts of a scene, as it is after its set-up effects, do not fit."""
+    """Raise :class:`ParameterError` if the parts of a scene, after its set-up effects, do not fit together."""
     scene = actual(scene)
     for effect in scene.effects:
         if effect.on and not scene.contact.carries(effect.name):
@@ -236,7 +237,7 @@ def check(scene: Scene) -> None:
 
 
 def _check_gravity(scene: Scene) -> None:
-    """In a rig, bodies fall."""
+    """In a rig, refuse gravity that does not point downwards or is too large."""
     in_rig = scene.rig.name in RIGS or scene.rig.name in BENCH_RIGS
     if in_rig and not (scene.gravity[2] < 0.0 and math.hypot(*scene.gravity) <= MOST_GRAVITY):
         raise ParameterError(
@@ -245,7 +246,7 @@ def _check_gravity(scene: Scene) -> None:
 
 
 def actual(scene: Scene) -> Scene:
-    """``scene`` after its set-up effects; they are off in the result, so doing it again changes nothing."""
+    """``scene`` after its set-up effects; they are off in the result, so applying it again changes nothing."""
     for kind in set_up_effects():
         effect = scene.effect(kind.name)
         if isinstance(effect, SetUpEffect) and effect.on:

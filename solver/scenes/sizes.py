@@ -30,7 +30,7 @@ CUT = 3.0
 LEAST_SPREAD = 1e-6
 """Below this, a nanometre on a millimetre, all bodies have the declared size."""
 SIZE_STREAM = 1
-"""Spawn key of the generator of sizes: orders, places and orientations of a pour do not depend on them."""
+"""Spawn key of the generator of sizes: order, places and orientations in a pour do not depend on the sizes drawn."""
 
 
 @dataclass(frozen=True)
@@ -81,9 +81,9 @@ class SizeDistribution:
 def drawn_sizes(distributions: Sequence[SizeDistribution], order: Ints, seed: int) -> Array:
     """Scale of every body of a pour, shape (n,); ``order`` is each body's index into ``distributions``.
 
-    Stratified: the n bodies of a component take one place each in n shares of equal probability, in random order.
-    Every single body follows the distribution exactly, and the mass of a pour scatters far less than that of
-    independent draws would (30 g of seeds, log-normal with 0.3: 2 % instead of 12 %).
+    Stratified: the n bodies of a component take one value each from n intervals of equal probability, in random order.
+    Every single body follows the distribution exactly, and the mass of a pour scatters far less than with independent
+    draws (30 g of seeds, log-normal with 0.3: 2 % instead of 12 %).
     """
     scale = np.ones(len(order))
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(SIZE_STREAM,)))

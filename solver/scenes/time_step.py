@@ -1,24 +1,26 @@
 """The stable time step of a scene.
 
-Limits, of which the smallest rules:
+The smallest of these limits applies:
 
-    Rayleigh    dt = f T_R,  T_R = π R √(ρ/G) / (0.1631 ν + 0.8766)   of the smallest member sphere (EDEM, LIGGGHTS)
-    landing     dt = b l / (ω √(1 + d N β⁴)),  ω = √(N k/m)   of a body that lands on N member spheres at once
-    tip         the same of a body that is hit at its outermost sphere: N = 1, with the mass it shows there
-    slip        dt = 1.5 b √(m_eff/k)   of a body pulled sideways at its outermost point; b √(m_eff/k) of one sphere
+    Rayleigh    dt = f T_R,  T_R = π R √(ρ/G) / (0.1631 ν + 0.8766)   for the smallest member sphere (EDEM, LIGGGHTS)
+    landing     dt = b l / (ω √(1 + d N β⁴)),  ω = √(N k/m)   for a body that lands on N member spheres at once
+    tip         the same for a body that is hit at its outermost sphere: N = 1, with the effective mass there
+    slip        dt = 1.5 b √(m_eff/k)   for a body pulled sideways at its outermost point; b √(m_eff/k) for one sphere
 
-k is the stiffness dF/dδ of the contact law at the overlap that an impact at 2 m/s makes, β = −ln e/√(π² + ln² e) of the
-pair, and m_eff the mass that a body shows at r along a direction u, 1/m_eff = 1/m + (r × u)ᵀ I⁻¹ (r × u), for the
-worst u. A dashpot knows its own force at the end of the step and that of the others by the last one, so of N that
-act at once N − 1 are late, and many strong ones gain energy: the root keeps that off. (A dashpot at a tip damps with
-the whole mass, and counts m/m_eff times.) l and d, ``landing_step`` and ``damped_landing`` of the contact law, are
-fitted to landings of 1 to 38 spheres with e = 0.05 … 0.9, which all miss the exact speed by less than 0.015 of the
-impact's (solver/README.md, *Time step*). That the stable step of a central difference falls with the number of
-contacts and with damping: O'Sullivan & Bray 2004 (doi:10.1108/02644400410519794).
+k is the stiffness dF/dδ of the contact law at the overlap reached in an impact at 2 m/s, β = −ln e/√(π² + ln² e) with
+the restitution e of the pair, and m_eff the effective mass of a body at r along a direction u,
+1/m_eff = 1/m + (r × u)ᵀ I⁻¹ (r × u), for the worst u. A dashpot uses its own force at the end of the step but the
+forces of the others from the previous step. Of N dashpots that act at once N − 1 are therefore late, and many strong
+ones add energy, which the square root prevents. (A dashpot at a tip damps with the whole mass, and counts m/m_eff
+times.) l and d, ``landing_step`` and ``damped_landing`` of the contact law, are fitted to landings of 1 to 38 spheres
+with e = 0.05 … 0.9; in all of them the speed deviates from the exact one by less than 0.015 of the impact speed
+(solver/README.md, *Time step*). The stable step of a central difference decreases with the number of contacts and with
+damping: O'Sullivan & Bray 2004 (doi:10.1108/02644400410519794).
 
-f is ``numerics.rayleigh_fraction``, b ``numerics.impact_fraction``. With f = 1 and b = 2 (leapfrog: ω dt < 2), they
-are the limit of stability. All are proportional to the size of a body, so the smallest that its distribution of sizes
-allows is taken, whatever the seed draws. An effect that stiffens contacts or takes more of an impact shortens them.
+f is ``numerics.rayleigh_fraction``, b ``numerics.impact_fraction``. With f = 1 and b = 2 (leapfrog: ω dt < 2), these
+steps are the limits of stability. All are proportional to the size of a body, so the smallest size that its
+distribution allows is used, whatever the seed draws. An effect that stiffens contacts or dissipates more of an impact
+shortens them.
 """
 
 from __future__ import annotations
@@ -38,16 +40,16 @@ from solver.scenes.scene import Scene
 from solver.shapes.clump import Clump, scaled
 
 IMPACT_SPEED = 2.0
-"""Speed [m/s] at which landings are taken; a fall of 0.2 m."""
+"""Assumed speed [m/s] of an impact; that of a fall from 0.2 m."""
 LEAPFROG = 2.0
 """Largest ω dt of a stable leapfrog step."""
 SLIP = 1.5
-"""Step of a contact that is pulled sideways, in steps of one that is pressed, of bodies of several spheres. A single
-one, which gives back the declared restitution itself, takes 1: within 0.5 % of e = 0.2 … 0.98."""
+"""Step of a contact that is loaded sideways over that of one that is compressed, for bodies of several spheres. For a
+single sphere, which reproduces the declared restitution itself, it is 1: within 0.5 % of e = 0.2 … 0.98."""
 OUTERMOST = 24
-"""Member spheres among which the faces of a body are looked for."""
+"""Number of outermost member spheres among which the faces of a body are looked for."""
 MEETING = 3
-"""Member spheres on which a body lands on another one: two bodies seldom meet face to face."""
+"""Number of member spheres with which a body lands on another one: two bodies seldom meet face to face."""
 
 
 def rayleigh_time(radius: float, material: Material) -> float:
@@ -80,7 +82,7 @@ def _at_contacts(scene: Scene) -> list[ContactEffect]:
 
 
 def _impacts(scene: Scene, body: Body, clump: Clump) -> Iterator[float]:
-    """Of every partner of ``body``, the steps [s] of landing, tip and slip for b = 1."""
+    """Steps [s] of landing, tip and slip for b = 1, for every partner of ``body``."""
     law, largest, mass = CONTACT_LAWS[scene.contact.law], float(clump.radii.max()), clump.mass
     at_sphere, at_surface = _mass_at(clump, np.zeros_like(clump.radii)), _mass_at(clump, clump.radii)
     partners: list[tuple[Body | str, str]] = [(other, other.material) for other in scene.bodies]
@@ -88,7 +90,7 @@ def _impacts(scene: Scene, body: Body, clump: Clump) -> Iterator[float]:
         e_star = effective_youngs_modulus(scene.material(body.material), scene.material(name))
 
         def stiffness(spheres: int, e_star: float = e_star) -> float:
-            """Of each of so many that share an impact: the energy of one is a part of the whole."""
+            """Stiffness of each of ``spheres`` that share an impact, each with its share of the energy."""
             return law.stiffness(e_star, largest, mass, IMPACT_SPEED / math.sqrt(spheres), scene.contact)
 
         depth = IMPACT_SPEED * math.sqrt(mass / stiffness(1))
@@ -104,9 +106,9 @@ def _impacts(scene: Scene, body: Body, clump: Clump) -> Iterator[float]:
 
 
 def landing_together(clump: Clump, depth: float) -> int:
-    """Largest number of member spheres that touch a plane at once, by half of ``depth`` [m] at least.
+    """Largest number of member spheres that touch a plane at once, each to at least half of ``depth`` [m].
 
-    Planes square to the principal axes, and through every three of the outermost centres.
+    The planes are normal to the principal axes, or parallel to one through three of the outermost centres.
     """
     outermost = np.argsort(-np.linalg.norm(clump.centres, axis=1), kind="stable")[:OUTERMOST]
     corners = clump.centres[list(combinations(outermost, 3))].reshape(-1, 3, 3)
@@ -118,7 +120,7 @@ def landing_together(clump: Clump, depth: float) -> int:
 
 
 def _mass_at(clump: Clump, beyond: npt.NDArray[np.float64]) -> float:
-    """Least mass [kg] that ``clump`` shows ``beyond`` [m] the centre of any member sphere, across the way to it."""
+    """Smallest effective mass [kg] of ``clump`` at ``beyond`` [m] past any sphere's centre, across the lever arm."""
     lever = clump.centres.copy()
     length = np.linalg.norm(lever, axis=1)
     away = np.divide(lever, length[:, None], out=np.tile([1.0, 0.0, 0.0], (len(lever), 1)), where=length[:, None] > 0.0)

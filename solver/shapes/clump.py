@@ -1,10 +1,10 @@
-"""Clumps: rigid bodies that touch by their member spheres and move with the inertia of the true solid.
+"""Clumps: rigid bodies that touch with their member spheres and move with the inertia of the true solid.
 
-A fit of member spheres takes seconds, reading it back a millisecond, so fits are kept between programs: one file per
-fit, of shipped bodies in ``assets/clumps``, of all others in ``$REPOSE_CACHE`` or ``clumps`` in the user's cache
-directory. Its name is a digest of all that the fit depends on (the solid, a mesh by its contents; the spheres asked
-for; the version of the fitting), so a file is either the fit that was asked for or not found. A cache that cannot be
-read or written is as none.
+A fit of member spheres takes seconds, reading it back a millisecond, so fits are kept between runs of the program: one
+file per fit, for shipped bodies in ``assets/clumps``, for all others in ``$REPOSE_CACHE`` or ``clumps`` in the user's
+cache directory. Its name is a digest of all that the fit depends on (the solid, a mesh by its contents; the requested
+spheres; the version of the fitting), so that the file found is always the requested fit. A cache that cannot be read or
+written is ignored.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from solver.version import FITTING
 
 Array = npt.NDArray[np.float64]
 Fit = tuple[Array, Array, ClumpFit]
-"""Centres (n, 3) [m], radii (n,) [m] and how well they stand for the solid."""
+"""Centres (n, 3) [m], radii (n,) [m] and how well they represent the solid."""
 
 MOST_SPHERES = 128
 EXTENT_LIMIT = 0.02
@@ -44,12 +44,12 @@ INTERIOR_POINTS = 30_000
 
 @dataclass(frozen=True)
 class Demand:
-    """What a resolution asks of a clump.
+    """What a resolution requires of a clump.
 
     Args:
         rms: largest RMS surface deviation, relative to the diameter of the sphere of the same volume.
-        least_radius: smallest member sphere, relative to the largest inside the solid; it sets the time step.
-        most_spheres: where the search ends; the best clump so far is then taken, with its stated error.
+        least_radius: smallest member sphere, relative to the largest sphere inside the solid; it sets the time step.
+        most_spheres: number at which the search ends; the best clump so far is then used, with its stated error.
     """
 
     rms: float
@@ -75,8 +75,8 @@ class Clump:
         radii: (n,) [m].
         mass: [kg].
         inertia: (3,) principal moments about x, y, z [kg m2].
-        bounding_radius: of the sphere about the centre of mass that holds every member sphere [m].
-        fit: how well the spheres stand for the solid.
+        bounding_radius: radius of the sphere about the centre of mass that contains every member sphere [m].
+        fit: how well the spheres represent the solid.
     """
 
     centres: Array
@@ -88,14 +88,14 @@ class Clump:
 
 
 def fit_clump(solid: Solid, density: float, spheres: str) -> Clump:
-    """The clump of as few spheres as meet the resolution's demand, or of a number of them; the same bits every time.
+    """The clump of the fewest spheres that meet a resolution's demand, or of a given number; the same bits every time.
 
     Resolution: starting layouts are tried by ascending number of spheres and refined by least squares
     (`solver.shapes.sphere_fit`); the first number whose best layout meets the RMS deviation, and outer dimensions
-    within 2 %, is taken. If none does, the layout of least deviation is, and `fit` says by how much it
-    misses. Number: the best symmetric layout of so many spheres where the solid is symmetric and there is one,
-    else the best of `solver.shapes.sphere_number`. A sphere is its own clump, exactly. Mass and inertia are the
-    solid's, never the spheres'. Kept in memory (a mesh by the time of its file's last change) and on disk
+    within 2 %, is used. If none does, the layout of smallest deviation is used, and `fit` states its error.
+    Number: the best symmetric layout of that many spheres if the solid is symmetric and there is one, else the
+    best of `solver.shapes.sphere_number`. A sphere is its own clump, exactly. Mass and inertia are the solid's,
+    never the spheres'. Kept in memory (a mesh by the time of its file's last change) and on disk
     (`solver.shapes.clump`).
 
     Args:
@@ -124,19 +124,19 @@ def explicit_clump(
 ) -> Clump:
     """A body that is declared by its spheres.
 
-    Without a `fit` the union of spheres is the body itself and has no error. Nothing is recentred: the
-    declaration says where the centre of mass is.
+    Without a `fit` the union of spheres is the body itself and has no error. Nothing is recentred: the centre of
+    mass is where the declaration says.
 
     Args:
         centres: (n, 3) relative to the centre of mass, along the principal axes [m].
         radii: (n,) [m].
         mass: [kg].
         inertia: (3,) principal moments [kg m2].
-        fit: how well the spheres stand for another solid.
+        fit: how well the spheres represent another solid.
 
     Raises:
         ShapeError: wrong array shapes, values that are not finite, a radius, mass or moment that is not
-            positive, or moments that no body has (each must be at most the sum of the others).
+            positive, or moments that no body can have (each must be at most the sum of the others).
     """
     centres, radii, inertia = (
         _numbers("sphere_centres", centres),
@@ -209,12 +209,12 @@ def read_fit(path: Path) -> Fit | None:
 
 
 def write_fit(path: Path, fit: Fit) -> None:
-    """Keep a fit; a place that cannot be written keeps none."""
+    """Keep a fit; nothing is kept if the place cannot be written."""
     centres, radii, quality = fit
     _, share, covered, rms, largest, errors, smallest = astuple(quality)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        # Written apart and moved: another program never reads half a file.
+        # Written to a temporary file and moved: another program never reads half a file.
         with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as part:
             np.savez(
                 part, centres=centres, radii=radii, fit=np.array([share, covered, rms, largest, *errors, smallest])

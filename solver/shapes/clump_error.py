@@ -1,7 +1,7 @@
-"""How well member spheres stand for a solid: distance of the surfaces, volume, and the mass of the spheres themselves.
+"""How well member spheres represent a solid: distance of the surfaces, volume, and mass of the spheres themselves.
 
-:class:`ClumpFit` is the statement that goes with every clump, :class:`SphereError` what the spheres get wrong when they
-are looked at closely. Their mass and inertia are shown only: a body moves with those of the true solid.
+:class:`ClumpFit` is the statement that goes with every clump, :class:`SphereError` the errors of the spheres in detail.
+Mass and inertia of the spheres are only shown: a body moves with those of the true solid.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ CHECK_POINTS, CHECK_INTERIOR_POINTS = 4000, 200_000
 POINTS = 20_000
 """Points on the union's surface, before those inside other spheres are left out."""
 LOOKED_AT = 16
-"""Surface points whose facets are tried for the nearest place on a mesh."""
+"""Number of nearest surface points whose facets are tried for the nearest place on a mesh."""
 
 
 @dataclass(frozen=True)
 class ClumpFit:
-    """How well the member spheres stand for the solid.
+    """How well the member spheres represent the solid.
 
     Args:
         n_spheres: number of member spheres.
@@ -49,17 +49,17 @@ class ClumpFit:
 
 @dataclass(frozen=True, eq=False)
 class SphereError:
-    """How far a union of spheres is from the solid that it stands for.
+    """How far a union of spheres is from the solid that it represents.
 
     Args:
-        number: of spheres.
-        rms: larger of the two RMS distances [m], over the mesh to the union's surface and over the union's to the mesh.
+        number: number of spheres.
+        rms: larger of the two RMS distances [m], from the mesh to the union's surface and from the union's to the mesh.
         largest: largest distance either way [m] (Hausdorff).
         covered: share of the solid's volume that lies in the spheres.
-        volume: of the union, overlaps counted once [m3].
+        volume: volume of the union, overlaps counted once [m3].
         second: integrals of y² + z², z² + x², x² + y² over the union about the solid's centre of mass [m5]: times a
             density, the moments of inertia of the union.
-        smallest_radius: [m].
+        smallest_radius: radius of the smallest member sphere [m].
     """
 
     number: int
@@ -77,7 +77,7 @@ def extent_errors(bounds: Array, centres: Array, radii: Array) -> Array:
 
 
 def measured_fit(solid: Solid, centres: Array, radii: Array) -> ClumpFit:
-    """The fit's errors, on other and more points than it was made with."""
+    """The errors of a fit, on other and more points than those it was made with."""
     deviation = distance_to_union(surface_points(solid, CHECK_POINTS)[0], centres, radii)
     inside = interior_points(solid, CHECK_INTERIOR_POINTS)
     covered = np.any([((inside - c) ** 2).sum(axis=1) <= r**2 for c, r in zip(centres, radii, strict=True)], axis=0)
@@ -99,7 +99,7 @@ def sphere_error(solid: Solid, centres: Array, radii: Array) -> SphereError:
     points, owner = open_points(centres, radii, max(200, POINTS // len(radii)))
     area = radii[owner] ** 2
     back = distance_to_mesh(solid, points)
-    # what is furthest from the spheres is often a corner, where no sampled point lies
+    # the place furthest from the spheres is often a corner, where no sampled point lies
     vertices = surface_mesh(solid).vertices
     corners = np.asarray(vertices[:: 1 + len(vertices) // POINTS])
     volume, second = union_moments(centres, radii)

@@ -1,7 +1,7 @@
 """Surfaces from mesh files (STL, OBJ, PLY, GLB): read, welded, in metres, and refused unless they bound a solid.
 
-A file with several parts (a scene) is one rigid body of all of them. Parts that are closed one by one are put side by
-side; parts that are closed only together (a surface split by its materials) are welded.
+A file with several parts (a scene) is one rigid body of all of them. Parts that are each closed are put side by side;
+parts that are closed only together (a surface split by its materials) are welded.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ LENGTH_UNITS = UNITS["m"]
 MOST_BYTES = 100_000_000
 MOST_FACES = 500_000
 WELD = 1e-7
-"""Corners nearer than about this, relative to the largest extent, are one: single precision resolves 6e-8."""
+"""Corners closer than about this, relative to the largest extent, are merged: single precision resolves 6e-8."""
 FLAT = 1e-9
 """Volume over the cube of the largest extent below which a surface encloses nothing; a hair 1 : 1 : 1000 has 1e-6."""
 THIN = 1e-6
-"""Deviation of the corners from a plane, relative to that within it, below which they lie in it."""
+"""Spread of the corners normal to a plane, relative to that within it, below which they count as lying in it."""
 WINDING_CELLS = 200_000
 FEWEST_BAD_RAYS = 2
 
 
 class MeshFileError(ValueError):
-    """A mesh file that cannot be a solid; the message names the fault, in one line, but not the file."""
+    """A mesh file that does not describe a solid; the message names the fault, in one line, but not the file."""
 
 
 def read_solid_mesh(file: str, unit: str = "m") -> trimesh.Trimesh:
@@ -75,7 +75,7 @@ def _check_size(path: Path) -> None:
 def _parts(file: str) -> list[trimesh.Trimesh]:
     import trimesh
 
-    # It logs, with a traceback, the errors that it then raises.
+    # trimesh logs, with a traceback, the errors that it then raises.
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)
     try:
         found = trimesh.load_scene(file, process=False).dump(concatenate=False)
@@ -100,7 +100,7 @@ def _side_by_side(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
 
 
 def _welded(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Without texture and normals, equal corners made one, faces dropped in which a corner repeats."""
+    """``mesh`` without texture and normals, equal corners merged, faces with a repeated corner dropped."""
     import trimesh
 
     # 1e-30: a mesh that is one point has no extent
@@ -142,15 +142,15 @@ def _edge_fault(edges: npt.NDArray[np.int64]) -> str:
 
 
 def _check_winding(mesh: trimesh.Trimesh) -> None:
-    """Refuse a surface that encloses some place twice, or inside out.
+    """Refuse a surface that encloses any place twice, or inside out.
 
     Where two sheets of a closed surface cross, one of the four wedges between them has a winding number other than 0
-    and 1. The lattice sees wedges wider than a cell, 1/60 of a compact body; smaller ones change neither mass nor
+    and 1. The lattice detects wedges wider than a cell, 1/60 of a compact body; smaller ones change neither mass nor
     spheres by more than that.
     """
     winding = winding_numbers(mesh, lattice_axes(mesh, WINDING_CELLS, float(np.prod(mesh.extents))))
     bad = (winding[:-1] < -0.5) | (winding[:-1] > 1.5)
-    # a ray that is not outside again behind the mesh has slipped through an edge by rounding: it proves nothing
+    # a ray that is not outside again behind the mesh slipped through an edge by rounding: it proves nothing
     bad &= winding[-1] == 0.0
     if bad.any(axis=0).sum() >= FEWEST_BAD_RAYS:
         share = bad.sum() / (winding[:-1] > 0.5).sum()

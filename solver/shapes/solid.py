@@ -18,8 +18,8 @@ import numpy.typing as npt
 
 from solver.shapes.mesh_file import LENGTH_UNITS, SUFFIXES, MeshFileError, read_solid_mesh
 
-# Imported by the functions that make a mesh, here and in the other files of shapes: with what it brings along, trimesh
-# takes as long as the rest of the program, and a pour of known bodies needs none of it.
+# Imported by the functions that make a mesh, here and in the other files of shapes: trimesh and what it imports take as
+# long to load as the rest of the program, and a pour of known bodies needs none of it.
 if TYPE_CHECKING:
     import trimesh
 
@@ -40,7 +40,7 @@ ALLOWED = (
 
 
 class ShapeError(ValueError):
-    """A solid that cannot be: the message names the key, the value and what is allowed, in one line."""
+    """An impossible solid: the message names the key, the value and what is allowed, in one line."""
 
 
 @dataclass(frozen=True)
@@ -48,14 +48,14 @@ class Solid:
     """A solid body, by closed form or by a surface mesh.
 
     Args:
-        kind: which form.
+        kind: form of the solid.
         dimensions: full lengths [m]. Ellipsoid: three axes; cylinder: (diameter, length); box: three edges;
             sphere: (diameter,); mesh: empty.
         file: path of an STL, OBJ, PLY or GLB file; only for a mesh.
         unit: unit of the coordinates in the file.
 
     The order of axes or edges does not matter: the frame puts the longest along x and the shortest along z.
-    A cylinder at least as long as wide has its axis along x, a disc has it along z.
+    A cylinder at least as long as it is wide has its axis along x, a disc has it along z.
 
     Raises:
         ShapeError: unknown kind, wrong number of dimensions, a dimension that is not positive and finite, or
@@ -94,7 +94,7 @@ class Solid:
         """The solid that a TOML table declares, e.g. `{ ellipsoid = [27.92e-3, 11.18e-3, 6.11e-3] }` [m].
 
         Args:
-            table: exactly one key: ellipsoid, cylinder, box, sphere or mesh; beside mesh perhaps unit.
+            table: exactly one key: ellipsoid, cylinder, box, sphere or mesh; with mesh optionally unit.
             where: file and key of the table, for messages.
             folder: a relative mesh file is looked for here (default: the working directory). The mesh is read
                 at once, so that a bad file is refused together with the rest of the declaration.
@@ -118,7 +118,7 @@ class Solid:
 
 @dataclass(frozen=True, eq=False)
 class MassProperties:
-    """What Newton and Euler need of a solid.
+    """What the equations of motion (Newton, Euler) need of a solid.
 
     Args:
         mass: [kg].
@@ -193,12 +193,13 @@ def surface_mesh(solid: Solid, refinement: int = 2) -> trimesh.Trimesh:
             8 * 2**refinement sides of a cylinder; 2 is for drawing. Vertices lie on the true surface. A box
             has 12 faces, a mesh those of its file.
 
-    The frame is right-handed. The axes x and y of a mesh point where its surface reaches out (positive third
-    moment); where it is mirror-symmetric they follow the axes of the file. Equal principal moments leave the
-    axes within their plane to the file as well: they are repeatable, but do not turn with the body.
+    The frame is right-handed. The axes x and y of a mesh point to the side where its surface reaches further out
+    (positive third moment); if it is mirror-symmetric they follow the axes of the file. For equal principal
+    moments the axes within their plane depend on the file as well: they are repeatable, but do not turn with the
+    body.
 
     Returns:
-        A copy of the caller's own.
+        A copy that belongs to the caller.
 
     Raises:
         ShapeError: a mesh file that `solver.shapes.mesh_file` refuses.
@@ -208,7 +209,7 @@ def surface_mesh(solid: Solid, refinement: int = 2) -> trimesh.Trimesh:
 
 
 def file_stamp(solid: Solid) -> int:
-    """Time of the mesh file's last change [ns], 0 for a closed form: what a cache must know beside the solid.
+    """Time of the mesh file's last change [ns], 0 for a closed form: a cache must know it besides the solid.
 
     Raises:
         ShapeError: the file is missing.

@@ -1,4 +1,4 @@
-"""Points on and in a solid, without random numbers: what clumps are fitted to and measured by."""
+"""Points on and in a solid, without random numbers: clumps are fitted to them and measured with them."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 Residuals are the signed gaps between surface points p and the union, min over spheres of |p - c| - r,
 together with a stiff penalty on outer dimensions beyond a tolerance. Each residual depends on one sphere, so
-that the Jacobian is analytic and sparse; steps are Levenberg's (1944) and Marquardt's (1963).
+that the Jacobian is analytic and sparse; the steps are those of Levenberg (1944) and Marquardt (1963).
 
 Where the solid is mirror-symmetric in the three coordinate planes, the unknowns are one sphere per orbit, and
 surface points are folded into one octant: the clump is symmetric to the last bit and rests as the solid does.
@@ -27,7 +27,7 @@ EXTENT_TOLERANCE = 0.01
 EXTENT_WEIGHT = 3.0
 # spheres more or fewer in every other row: staggered rows on plates, short outer rows on seeds
 STAGGERS = (0, 1, -1, -2, -3, 2, 3)
-# every so many of the interior points are enough to place a start
+# one in this many interior points is enough to place a start
 THINNING = 7
 # layouts for one number of spheres: a plate has 13, a crooked body would have many more
 MOST_PER_COUNT = 14
@@ -55,7 +55,7 @@ class FitTarget:
     def inscribed_radius(self) -> float:
         """Radius of the largest sphere inside [m], to the spacing of the points: the unit of length here.
 
-        Half the thickness of a plate or a seed; of a bent strip its own, not that of its bounding box.
+        Half the thickness of a plate or a seed; for a bent strip that of the strip, not of its bounding box.
         """
         from scipy.spatial import cKDTree
 
@@ -112,7 +112,7 @@ def start_layouts(target: FitTarget, most: int, least_radius: float) -> dict[int
     A layout is given by the number of layers, the number of rows, the spacing along the rows and the
     difference between neighbouring rows; a row is as long as the solid is there. In an asymmetric solid each
     centre moves to the mean of the interior points nearest to it, so that the rows of a bent or hollowed body
-    lie inside. Radii start near the largest inscribed one, and at least at `least_radius` [m]: small spheres
+    lie inside. Radii start near the largest inscribed one, and at no less than `least_radius` [m]: small spheres
     have to prove useful.
     """
     from scipy.spatial import cKDTree
@@ -172,7 +172,7 @@ def refine(orbits: Orbits, target: FitTarget, least_radius: float, steps: int) -
 
 
 def without_idle(orbits: Orbits, target: FitTarget) -> Orbits:
-    """Orbits without those of which no sphere is nearest to any surface point."""
+    """`orbits` without those whose spheres are all nearest to no surface point."""
     centres, radii = orbits.spheres()
     distance = np.sqrt(squared_distances(target.surface, centres))
     nearest = (distance - radii + not_facing(target.surface, target.normals, centres)).argmin(axis=1)
@@ -203,7 +203,7 @@ class _Residuals:
 
     A residual depends on one sphere, hence on four unknowns at most: its row of the Jacobian is kept as four
     columns and four values, and the normal matrix is summed from them. Without large matrix products the bits
-    do not hang on the number of cores.
+    do not depend on the number of cores.
     """
 
     def __init__(self, orbits: Orbits, target: FitTarget) -> None:

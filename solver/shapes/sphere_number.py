@@ -1,14 +1,15 @@
 """The best clump of a given number of spheres, whatever the solid: convex or not, symmetric or not.
 
-The numbers 1, 2, 4, … up to the wanted one are gone through, since each also starts from the one before. Starts are
+The numbers 1, 2, 4, … up to the wanted one are fitted in turn, since each also starts from the one before. Starts are
 
     rows      of `solver.shapes.sphere_fit`, up to its limit
     cells     means of equal cells of the interior (Lloyd 1982), evenly along a rod, a ring or a bend
     cover     the largest inscribed spheres one after the other, each where it covers most that is not yet covered
     growth    the best of the number before, with spheres added under the surface points that lie furthest off
 
-All are refined by least squares (`solver.shapes.sphere_fit`), and the one of least deviation wins, measured both ways:
-from the solid's surface to that of the union and back, so that a sphere that closes the hole of a ring does not pay.
+All are refined by least squares (`solver.shapes.sphere_fit`), and the one of smallest deviation wins, measured both
+ways: from the solid's surface to that of the union and back, so that closing the hole of a ring with a sphere does not
+pay.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ def doubling(number: int) -> list[int]:
 def fitted(solid: Solid, numbers: list[int], least_radius: float = LEAST_RADIUS) -> Iterator[tuple[Array, Array]]:
     """Centres (n, 3) and radii (n,) [m] for each of ascending ``numbers`` of spheres; the same bits every time.
 
-    A number may come out smaller where spheres would stand for no part of the surface (a second sphere in a ball).
+    A number may come out smaller if spheres would represent no part of the surface (a second sphere in a ball).
     """
     target = general_target(solid)
     floor = least_radius * target.inscribed_radius
@@ -58,17 +59,17 @@ def fitted(solid: Solid, numbers: list[int], least_radius: float = LEAST_RADIUS)
 
 
 def general_target(solid: Solid) -> FitTarget:
-    """What spheres should follow, without use of mirror planes."""
+    """What the spheres should follow, without use of mirror planes."""
     surface, normals = surface_points(solid, SURFACE_POINTS)
     bounds = np.array(surface_mesh(solid).bounds)
     return FitTarget(surface, normals, interior_points(solid, INTERIOR_POINTS), bounds, symmetric=False)
 
 
 def deviation(target: FitTarget, centres: Array, radii: Array) -> float:
-    """The larger RMS distance [m] of the two ways between the solid's surface and the union's, to the points' spacing.
+    """The larger RMS distance [m], of both ways, between the solid's surface and the union's, to the points' spacing.
 
-    From the union the distance is taken to the tangent plane of the nearest surface point, if that is shorter than the
-    spacing of points allows to tell.
+    From the union, the distance is that to the tangent plane of the nearest surface point if the point is so close that
+    the spacing of points does not resolve it.
     """
     from scipy.spatial import cKDTree
 
@@ -107,7 +108,7 @@ def _cells(target: FitTarget, inside: Array, number: int, floor: float) -> Orbit
 
 
 def _cover(target: FitTarget, inside: Array, number: int, floor: float) -> tuple[Array, Array]:
-    """Centres and radii of inscribed spheres by the volume that each adds; smaller ones than the floor are not used."""
+    """Centres and radii of inscribed spheres, ordered by the volume that each adds; none is smaller than the floor."""
     from scipy.spatial import cKDTree
 
     depth = cKDTree(target.surface).query(inside)[0]
@@ -124,7 +125,7 @@ def _cover(target: FitTarget, inside: Array, number: int, floor: float) -> tuple
 
 
 def _grown(target: FitTarget, before: Orbits, number: int, floor: float) -> Orbits:
-    """The spheres of ``before`` and smallest ones just below the surface points that are furthest from them."""
+    """The spheres of ``before``, and smallest spheres just below the surface points that are furthest from them."""
     centres, radii = before.spheres()
     gap = (np.sqrt(squared_distances(target.surface, centres)) - radii).min(axis=1)
     for _ in range(number - len(radii)):

@@ -33,7 +33,7 @@ def union_volume(centres: Array, radii: Array) -> float:
 def distance_to_union(points: Array, centres: Array, radii: Array) -> Array:
     """Distance (m,) of points (m, 3) to the surface of a union of spheres [m].
 
-    Exact outside, and inside where the nearest place is straight away from a centre; elsewhere inside (the
+    Exact outside, and inside where the nearest place is radially outward from a centre; elsewhere inside (the
     nearest place is a groove between spheres) to the spacing, r / 18, of points spread over the surface.
     """
     from scipy.spatial import cKDTree

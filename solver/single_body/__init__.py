@@ -1,7 +1,7 @@
-"""Bench tests: the paper's own measurements of single bodies, run on the solver that was given the answers.
+"""Bench tests: the paper's own measurements of single bodies, run on the solver with known answers.
 
-Each has a rig (``solver/rigs``, ``BENCH_RIGS``) with its parameters, and a file here with ``measure(scene)``. A new one
-is those two files and a line in each of the two lists.
+Each test has a rig (``solver/rigs``, ``BENCH_RIGS``) with its parameters, and a file here with ``measure(scene)``. A
+new test needs these two files and a line in each of the two lists.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ __all__ = ["BENCH_TESTS", "BenchResult", "Quantity", "run_bench_test"]
 
 
 def run_bench_test(scene: Scene, seed: int = 1) -> BenchResult:
-    """Run the bench test that is the rig of ``scene``, as it is after its set-up effects.
+    """Run the bench test given by the rig of ``scene``, after the set-up effects of the scene.
 
-    ``seed`` draws the orientations where some are drawn.
+    ``seed`` is for the orientations, if the test draws any.
     """
     if scene.rig.name not in BENCH_TESTS:
         raise ParameterError(f"rig.name: {scene.rig.name!r} is no bench test; known: {', '.join(BENCH_TESTS)}")

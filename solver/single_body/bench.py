@@ -1,6 +1,7 @@
 """A bench with one body on it: the driver of the tests that measure a single body, and what such a test returns.
 
-No pour, and nothing sleeps. A result holds quantities beside what was put in, and the curves that they come from.
+There is no pour, and nothing sleeps. A result holds quantities beside the values that were put in, and the curves that
+they come from.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ class BenchResult:
 
 
 class Bench:
-    """One ``specimen`` of a scene's materials in ``rig``; making another bench ends this one."""
+    """One ``specimen`` of a scene's materials in ``rig``; making another bench invalidates this one."""
 
     def __init__(self, scene: Scene, rig: Rig, specimen: Body) -> None:
         numerics = dataclasses.replace(scene.numerics, sleep_speed=0.0)
@@ -102,8 +103,8 @@ class Bench:
 
 
 def onset_of(path: Sequence[tuple[float, float]], told: float) -> float:
-    """x where √v = 0, on the line through the first point (x, v) of ``path`` with v above a quarter of ``told`` and the
-    last one."""
+    """x where √v = 0, on the line through two points (x, v) of ``path``: the first with v above a quarter of ``told``,
+    and the last."""
     first, slow = next(one for one in path if one[1] > 0.25 * told)
     last, fast = path[-1]
     if last == first:

@@ -3,7 +3,7 @@
 E*       least squares of F on 4/3 √R δ^1.5 over the upper three quarters of the approach
 G*       least-squares slope of F_t on u, divided by 8 a, at the preload where the squeezing ended
 paper    Equation (1): E = (F/A)/(ΔL/T), A = π R δ the area of the contact, ΔL = 2 δ, T = 2 R
-         = 4 E* √R/(3 π √δ): no constant of the material, which is why it is shown over the approach
+         = 4 E* √R/(3 π √δ): not a material constant, which is why it is shown over the approach
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Array = npt.NDArray[np.float64]
 UPPER = 1
 """Index of the plate that moves."""
 MOMENTS = 200
-"""Readings while squeezing, and again while shearing."""
+"""Number of readings while squeezing, and again while shearing."""
 SETTLING = 0.02
 """Time at rest between squeezing and shearing [s]."""
 
@@ -35,7 +35,7 @@ SETTLING = 0.02
 def measure(scene: Scene, seed: int) -> BenchResult:
     """Squeeze and shear; E* and G* beside those of the two materials, and the paper's apparent modulus.
 
-    Raises ParameterError under another contact law than Hertz's: there the force says nothing of moduli in this way.
+    Raises ParameterError for contact laws other than Hertz's: there the force does not give moduli in this way.
     """
     if scene.contact.law != HertzMindlin.name:
         raise ParameterError(f"contact.law: {scene.contact.law!r} in a {scene.rig.name}; allowed: {HertzMindlin.name}")

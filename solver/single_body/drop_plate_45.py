@@ -29,13 +29,13 @@ Array = npt.NDArray[np.float64]
 
 NORMAL = np.array([1.0, 0.0, 1.0]) / math.sqrt(2.0)
 BEFORE_IMPACT = 1e-3
-"""From this long [s] before the impact on, the body is watched closely."""
+"""Time before the impact [s] from which the body is watched closely."""
 GIVEN_UP = 1.0
-"""A body that is not clear of the plate, whichever way it turns, this long [s] after the impact is given up."""
+"""Time after the impact [s] after which a body that is not clear of the plate, whichever way it turns, is given up."""
 MOMENT_STEPS = 5
 RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
 FRICTIONS = (0.0, 0.1, 0.3, 0.6)
-"""What the bias of the paper's estimate is shown over."""
+"""Values for which the bias of the paper's estimate is shown."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def drop(scene: Scene, specimen: Body, quaternion: Array) -> PlateRebound:
     gravity = math.hypot(*scene.gravity)
     clump = specimen.clump
     centres = clump.centres @ rotation_matrix(quaternion).T
-    # Below the centre of mass, along the vertical, the plate is touched first by the sphere with the least gap.
+    # Along the vertical through the centre of mass, the sphere with the smallest gap touches the plate first.
     touching = -float((centres @ NORMAL - clump.radii).min()) / NORMAL[2]
     bench.put(np.array([0.0, 0.0, touching + rig.drop_height]), quaternion)
     fall = math.sqrt(2.0 * rig.drop_height / gravity)
@@ -126,13 +126,13 @@ def drop(scene: Scene, specimen: Body, quaternion: Array) -> PlateRebound:
         state = bench.state()
         if flight < math.inf and float(state[0:3] @ NORMAL) > clump.bounding_radius:
             v = state[7:10]
-            # Gravity acts during the contact, too: taken as an impact in its middle.
+            # Gravity acts during the contact, too: it is treated as an impact in the middle of the contact.
             return PlateRebound(float(v[0]), float(v[2]) + gravity * (flight + 0.5 * contact))
     return PlateRebound(math.nan, math.nan)
 
 
 def _with_pair(scene: Scene, body: Body, pair: Pair) -> Scene:
-    """``scene`` where ``pair`` rules the contact of ``body`` with the wall."""
+    """``scene`` in which ``pair`` applies to the contact of ``body`` with the wall."""
     old = scene.contact_pair(body, pair.b)
     new = dataclasses.replace(pair, a=old.a, b=old.b)
     return dataclasses.replace(scene, pairs=tuple(new if one is old else one for one in scene.pairs))

@@ -34,12 +34,12 @@ EARTH = (0.0, 0.0, -9.81)
 PLATE = horizontal(0.0, "wall")
 """z = 0, bodies above it."""
 RADIUS = 5e-3
-"""Of the grain that :func:`sphere` makes unless told otherwise [m]."""
+"""Default radius of the grain that :func:`sphere` makes [m]."""
 AT_REST = np.zeros(3)
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 ROOM = Capacity(worlds=1, bodies=128, members=1024, contacts=8192, kinds=64).rounded()
-"""One size for all free worlds without a mesh, so that the kernels are compiled once. Only the newest is alive."""
+"""One size for all free worlds without a mesh, so that the kernels are compiled once. Only the newest one is valid."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class GivenSurfaces(BareRig):
 
 
 def sphere(radius: float = RADIUS, material: Material = GRAIN, copies: int = 1, name: str = "grain") -> Body:
-    """A solid sphere; ``copies`` member spheres that coincide change nothing of its mass."""
+    """A solid sphere; ``copies`` coincident member spheres do not change its mass."""
     mass = 4.0 / 3.0 * np.pi * radius**3 * material.density
     inertia = 0.4 * mass * radius**2
     members = Members(((0.0, 0.0, 0.0),) * copies, (radius,) * copies, mass, (inertia,) * 3)
@@ -70,7 +70,7 @@ def scene_of(
     surfaces: Sequence[Surface] = (PLATE,),
     gravity: tuple[float, float, float] = FREE,
 ) -> Scene:
-    """A scene whose rig is ``surfaces`` of the material "wall" and no more; no body falls asleep in it."""
+    """A scene whose rig consists only of ``surfaces`` of the material "wall"; no body falls asleep in it."""
     rig, awake = GivenSurfaces(tuple(surfaces)), Numerics(sleep_speed=0.0)
     return Scene("laboratory", tuple(materials), tuple(bodies), tuple(pairs), rig, numerics=awake, gravity=gravity)
 
@@ -94,11 +94,11 @@ def grain_on_plate(
 
 
 class FreeWorld:
-    """Bodies of a scene, put where they are wanted; the next free world takes the arrays over and ends this one.
+    """Bodies of a scene, put where they are wanted; the next free world takes over the arrays and invalidates this one.
 
     ``kinds`` says which of the scene's bodies each of them is: a number of bodies of the first kind, or one index per
-    body. The time step [s] is ``dt``, or by the rule of ``time_step.py`` with ``fraction`` of the Rayleigh time.
-    ``active`` says which surfaces are there from the start; without it all of them are if ``plate``, else none.
+    body. The time step [s] is ``dt``, or that of ``time_step.py`` with ``fraction`` of the Rayleigh time. ``active``
+    says which surfaces are there from the start; None: all of them if ``plate``, else none.
     """
 
     def __init__(
@@ -131,7 +131,7 @@ class FreeWorld:
         return dict(zip(SUMMARY_COLUMNS, row.tolist(), strict=True))
 
     def run_apart(self, steps: int, chunk: int) -> None:
-        """Advance until contacts have formed and all are over, at most ``steps``, looking every ``chunk`` steps."""
+        """Advance until contacts have formed and all have ended, at most ``steps``, checking every ``chunk`` steps."""
         met = False
         for _ in range(0, steps, chunk):
             touching = self.run(chunk)["touching"] > 0
@@ -146,7 +146,7 @@ class FreeWorld:
 
 
 def room_for(surfaces: Sequence[Surface]) -> Capacity:
-    """:data:`ROOM`, with as much room for triangles as ``surfaces`` have."""
+    """:data:`ROOM`, with as much room for triangles as ``surfaces`` need."""
     tables = wall_tables(tuple(surfaces))
     return dataclasses.replace(
         ROOM,

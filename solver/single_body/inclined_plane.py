@@ -1,11 +1,11 @@
 """Angle at which a body begins to slide (``rigs/inclined_plane.py``), or a ball to roll; and how high a ball rebounds.
 
-First a fast tilt finds the angle roughly, then a slow one from ``MARGIN`` below it measures. Sliding is noticed late,
-at ``SLIDING`` speed. As the tilt grows in proportion to time, so does the acceleration: √v grows in proportion to the
-time, and to the tilt, since the onset, which is where the line through two of its values meets zero. The same holds for
-a ball that rolls, held up to tan α = μ_r by its rolling resistance (``effects/rolling_resistance.py``).
+A fast tilt first finds the angle roughly; a slow one that starts ``MARGIN`` below it then measures it. Sliding is
+noticed late, at ``SLIDING`` speed. As the tilt grows in proportion to time, so does the acceleration: √v grows in
+proportion to the time, and to the tilt, since the onset, which is where the line through two of its values meets zero.
+The same holds for a rolling ball, held up to tan α = μ_r by its rolling resistance (``effects/rolling_resistance.py``).
 
-On the level plane a ball that falls by h1 rises to h2 = e² h1, without air.
+On the level plane, a ball that falls from h1 rises to h2 = e² h1, without air.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from solver.scenes.scene import Scene
 from solver.single_body.bench import Bench, BenchResult, Quantity, ball, held, onset_of
 
 FAST = 20.0
-"""Speed of the first tilt, and of the way to where the second begins [°/s]."""
+"""Speed of the first tilt, and of the second until it reaches its starting angle [°/s]."""
 MARGIN = 3.0
 """How far below the rough angle the slow tilt begins [°]."""
 STEEPEST = 85.0
-"""Tilt at which a body that holds is given up [°]."""
+"""Tilt at which a body that still holds is given up [°]."""
 SLIDING = 1e-3
-"""Speed at which the body slides [m/s]."""
+"""Speed from which the body counts as sliding [m/s]."""
 MOMENT = 1e-3
 """Simulated time between two changes of the tilt [s]."""
 SETTLING = 0.1
 """Time to settle on the level plane [s]."""
 CLOSE_BY = 1e-3
-"""From this long [s] before the impact on, a falling ball is watched, every ``LOOK`` steps."""
+"""Time before the impact [s] from which a falling ball is watched, every ``LOOK`` steps."""
 LOOK = 5
 GIVEN_UP = 1.0
-"""A ball that is not off the plane this long [s] after the impact stays on it."""
+"""Time after the impact [s] after which a ball that has not left the plane counts as staying on it."""
 
 Path = list[tuple[float, float, float]]
 """Tilt [°], displacement [m], speed [m/s]."""
@@ -67,7 +67,7 @@ def measure(scene: Scene, seed: int) -> BenchResult:
 def onset(scene: Scene, specimen: Body) -> tuple[float, Path]:
     """Angle [°] from which on ``specimen`` moves down the plane, NaN if it holds, and the path of the slow tilt.
 
-    One that is :func:`~solver.single_body.bench.held` slides there, a ball rolls or slides.
+    A specimen that is :func:`~solver.single_body.bench.held` slides; a ball rolls or slides.
     """
     rig = cast(InclinedPlane, scene.rig)
     rough, _ = _tilt(scene, specimen, 0.0, FAST)
@@ -104,7 +104,7 @@ def _set_tilt(bench: Bench, gravity: float, tilt_deg: float) -> None:
 def rebound_height(scene: Scene, body: Body, height: float) -> float:
     """Height [m] to which a ball of ``body`` rises again, its lowest point above the plane, after falling ``height``.
 
-    NaN if it stays there. Once it is off the plane its flight is the free one, z + v²/(2g).
+    NaN if it stays on the plane. Once it has left the plane it flies freely, up to z + v²/(2g).
     """
     specimen, gravity = ball(body), math.hypot(*scene.gravity)
     bench = Bench(scene, scene.rig, specimen)

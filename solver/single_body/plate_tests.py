@@ -1,15 +1,15 @@
-"""What a single body shows on a plate of the rig's walls: two apparent frictions and a restitution.
+"""Tests of a single body on a plate of the rig's wall material: two apparent frictions and a restitution.
 
 A body lies on the plate as it is declared, with z upward, held so that it can neither roll nor tip, and is pulled along
 by a growing force, as on a sled (ASTM D1894):
 
     apparent static friction    F/(m g) where it begins to slide: μ_s (1 + F_a/(m g)) if its contacts adhere by F_a
-    apparent kinetic friction   F/(m g) that keeps it sliding, by how it slows down
+    apparent kinetic friction   F/(m g) that keeps it sliding, from how it slows down
     restitution                 √(h₂/h₁) of a ball of its volume that falls by h₁ = ``DROP`` and rises by h₂
 
-So adhesion, a friction that falls with speed and what impacts lose are each seen by itself, where a pile shows them
-together. The force grows by the factor e in ``RAMP`` steps, and sliding is noticed late: speed grows with the square of
-the time since its onset, which is where √v, over the logarithm of the force, meets zero.
+So adhesion, a friction that falls with speed, and the losses of impacts are each seen separately, where a pile shows
+them together. The force grows by the factor e in ``RAMP`` steps, and sliding is noticed late: speed grows with the
+square of the time since its onset, which is where √v, over the logarithm of the force, meets zero.
 """
 
 from __future__ import annotations
@@ -34,25 +34,25 @@ from solver.single_body.inclined_plane import rebound_height
 DROP = 0.2
 """Height of the fall [m], that of Processes 2022, 10, 185, §2.5."""
 SETTLING, RAMP, FAST, MOMENT = 3_000, 20_000, 2_000, 40
-"""Steps in which the body gets its weight, in which the pull grows by the factor e, in which it does where its onset is
-only looked for, and between two looks."""
+"""Numbers of steps: in which the body gets its weight, in which the pull grows by the factor e in the slow test and in
+the quick one, and between two readings."""
 WEAKEST, STRONGEST = 0.3, 1e4
-"""The pull begins at this share of the declared friction; what this one [weights] does not move is not moved."""
+"""Share of the declared friction at which the pull begins, and pull [weights] at which a body counts as immovable."""
 MARGIN = 0.7
-"""Share of the pull of the quick look at which the slow one begins."""
+"""Share of the quick test's result at which the pull of the slow test begins."""
 NOTHING = 1e-3
 """Friction below which nobody could measure it."""
 LATE = 0.08
 """The onset is told once the body has slid for this share of the time in which the pull grows by e."""
 SLIDES, SLOWER, LOOKS = 0.15, 0.05, 10
-"""Speeds [m/s] between which a sliding body is watched, and how often it is looked at between them."""
+"""Speeds [m/s] between which a sliding body is watched, and number of readings between them."""
 LONGEST = 1.0
-"""For so long [s] at most."""
+"""Longest time for which a sliding body is watched [s]."""
 
 
 @dataclass(frozen=True)
 class PlateTest:
-    """The test ``name`` of the component ``body`` of ``scene``, effects in it."""
+    """The test ``name`` of the component ``body`` of ``scene``, including its effects."""
 
     scene: Scene
     body: str
@@ -60,7 +60,7 @@ class PlateTest:
 
 
 def static_pull(scene: Scene, body: Body) -> float:
-    """Apparent static friction, ``NOTHING`` to ``STRONGEST``."""
+    """Apparent static friction, between ``NOTHING`` and ``STRONGEST``."""
     least = WEAKEST * scene.contact_pair(body, scene.rig.wall).static_friction
     rough = _onset(scene, body, least, FAST)
     return _onset(scene, body, MARGIN * rough, RAMP) if NOTHING < rough < STRONGEST else rough
@@ -114,7 +114,7 @@ def _lying(scene: Scene, body: Body) -> tuple[Bench, float]:
     """``body`` at rest on the plate, and g."""
     bench, g = Bench(scene, scene.rig, held(body)), math.hypot(*scene.gravity)
     bench.lay()
-    # Its weight comes gradually: contacts that hardly damp would go on swinging.
+    # Its weight is applied gradually: contacts with little damping would go on oscillating.
     for share in np.arange(1, SETTLING // MOMENT + 1) * (MOMENT / SETTLING):
         bench.batch.set_gravity(0, (0.0, 0.0, -g * share))
         bench.run(MOMENT * bench.dt)
@@ -130,11 +130,11 @@ def plate_test(asked: PlateTest) -> float:
 
 
 _KNOWN: dict[tuple[str, str, str], float] = {}
-"""What was run before, by the key of the scene, body and test."""
+"""Results so far, by the key of the scene, body and test."""
 
 
 def plate_tests(asked: Sequence[PlateTest]) -> list[float]:
-    """The numbers of tests, run in processes of their own, those of equal scenes once."""
+    """Results of the tests, run in processes of their own; tests of equal scenes are run only once."""
     keys = [(pour_key(one.scene, 0), one.body, one.name) for one in asked]
     fresh = {key: one for key, one in zip(keys, asked, strict=True) if key not in _KNOWN}
     if fresh:
