@@ -299,9 +299,11 @@ def bracket(path_means: npt.ArrayLike, target: float, standard_errors: npt.Array
         resolved = bool(all(abs(errors[k]) > 1.96 * spread[k] for k in (lower, upper)))
         if not resolved:
             statement += " At least one of them lies within replicate noise of the target, so the place is uncertain."
-    if len(pairs) > 1:
-        statement += f" It passes {len(pairs)} times along the path; the pair with the smallest errors is taken."
-    return Bracket(target, lower, upper, position, True, resolved, nearest, len(pairs), errors, relative, statement)
+    # A step that meets the target ends one pair and begins the next.
+    passes = sum(errors[i] != 0 or i == valid[0] for i, _ in pairs)
+    if passes > 1:
+        statement += f" It passes {passes} times along the path; the pair with the smallest errors is taken."
+    return Bracket(target, lower, upper, position, True, resolved, nearest, passes, errors, relative, statement)
 
 
 def region_around(path: AscentPath, found: Bracket | Approach, minimum_share: float = LEAST_SHARE) -> Region:

@@ -55,7 +55,7 @@ def read_observations(
     for replicate in range(table.replicates + 1, scanned + 1):
         if replicate not in pile_paths:
             raise MeasurementError(
-                f"{pile_paths[replicates]}: replicate {replicate} of {scanned} is missing; allowed: numbered from 1 "
+                f"{pile_paths[scanned]}: replicate {replicate} of {scanned} is missing; allowed: numbered from 1 "
                 "without gaps"
             )
     stated = _padded(table.values, replicates)

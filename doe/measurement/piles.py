@@ -58,6 +58,8 @@ def pile_files(folder: Path, conditions: Iterable[str]) -> tuple[dict[str, dict[
     for path in sorted((folder / "piles").glob("*")):
         name, _, number = path.stem.rpartition("_")
         if path.suffix == ".npz" and name in found and number.isdecimal() and int(number) >= 1:
+            if int(number) in found[name]:
+                raise MeasurementError(f"{path}: replicate {int(number)} has more than one scan; allowed: one file")
             found[name][int(number)] = path
         else:
             strangers.append(path)

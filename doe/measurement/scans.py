@@ -322,6 +322,10 @@ def _of_image(path: Path, settings: ScanSettings) -> tuple[Array, float]:
             if not image.mode.startswith("I"):
                 raise MeasurementError(f"an image of mode {image.mode}; allowed: one channel of 16 or 32 bits")
             counts = np.asarray(image, dtype=np.float64)
+    except Image.DecompressionBombError:
+        raise MeasurementError(
+            f"more than {2 * (Image.MAX_IMAGE_PIXELS or 0)} pixels; allowed: up to {MOST_POINTS} in all"
+        ) from None
     except (UnidentifiedImageError, OSError, ValueError) as error:
         if isinstance(error, MeasurementError):
             raise

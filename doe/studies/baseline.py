@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Literal
 
+import numpy as np
 from scipy import stats
 
 from doe.analysis.pilot import Noise
@@ -136,7 +137,8 @@ def _parameters(before: StudyResult, now: StudyResult) -> Iterator[Compared]:
             continue
         a, b = old[path], new[path]
         answer: Answer
-        if a == b:
+        # Ends are NaN where the target is out of reach.
+        if np.array_equal(astuple(a), astuple(b), equal_nan=True):
             answer, why = "same", "equal"
         elif a.identified and b.identified:
             error = math.hypot(a.high - a.low, b.high - b.low) / (2.0 * HALF_WIDTHS)

@@ -409,6 +409,8 @@ class Pour:
 
     def _set_time_step(self, dt: float) -> None:
         self._time_base, self._steps_base = self.time, self.steps
-        self._left = max(1, math.ceil(self._left * self.dt / dt))
+        self._left, self._motion_left = (
+            max(1, math.ceil(steps * self.dt / dt)) for steps in (self._left, self._motion_left)
+        )
         self.dt = dt
         self.batch.set_time_step(self.w, dt)

@@ -109,7 +109,11 @@ def run_queue(
             job = queue.popleft()
             law = job.scene.contact.law
             free = next((law, w) for w in places if (law, w) not in running)
-            running[free] = (job, job.begin(batches[law], free[1]))
+            pour = job.begin(batches[law], free[1])
+            if pour.steps_due() == 0:  # it was interrupted after its end
+                yield job, pour.record()
+                continue
+            running[free] = (job, pour)
         if not running:
             return
         for law, batch in batches.items():

@@ -58,8 +58,9 @@ def measure(scene: Scene, seed: int) -> BenchResult:
     g_star = math.nan
     if friction > 0.0:
         contact_radius = math.sqrt(radius * overlap[-1])
-        # Where the tangential force is the wanted share of sliding, were G* = 0.4 E* (for ν = 0.3 it is 0.41 E*).
-        shift = 2.0 * rig.shear_load * friction * force[-1] / (8.0 * 0.4 * e_star * contact_radius)
+        # Where T = 8 G* a s, at a slip s of half the shift, is the wanted share of sliding by the declared ratio G*/E*.
+        expected = e_star * effective_shear_modulus(*materials) / effective_youngs_modulus(*materials)
+        shift = 2.0 * rig.shear_load * friction * force[-1] / (8.0 * expected * contact_radius)
         slip, tangential = _shear(bench, rig, shift)
         g_star = float(np.polyfit(slip, tangential, 1)[0]) / (8.0 * contact_radius)
     apparent = (force / (math.pi * radius * overlap)) / (approach / (2.0 * radius))

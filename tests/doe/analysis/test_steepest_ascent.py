@@ -53,6 +53,15 @@ def test_bracket_interpolates_the_sign_change():
     assert found.position == pytest.approx(2 + (24.68 - 24.05) / (25.33 - 24.05))
 
 
+@pytest.mark.parametrize(
+    ("means", "passes"), [([1.0, 2.0, 3.0], 1), ([2.0, 3.0], 1), ([1.0, 3.0, 1.0], 2), ([1.0, 2.0, 3.0, 1.0], 2)]
+)
+def test_a_step_that_meets_the_target_is_one_passage(means, passes):
+    found = bracket(means, 2.0)
+    assert found.crossings == passes
+    assert ("It passes" in found.statement) == (passes > 1)
+
+
 def test_the_printed_relative_errors_of_the_paper_refer_to_23_68():
     """Processes 2022, 10, 185, Table 7: its errors follow from its angles to the digit with 23.68, not
     24.68.

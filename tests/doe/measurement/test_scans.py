@@ -6,6 +6,7 @@ import trimesh
 from PIL import Image
 
 from doe.errors import MeasurementError
+from doe.measurement.piles import pile_files
 from doe.measurement.scans import (
     Scan,
     ScanSettings,
@@ -182,6 +183,16 @@ def test_files_belong_to_conditions_and_replicates(tmp_path):
         scan_files(tmp_path, ["slow"])
 
 
+def test_a_pile_belongs_to_one_replicate(tmp_path):
+    folder = tmp_path / "piles"
+    folder.mkdir()
+    (folder / "slow_01.npz").touch()
+    assert pile_files(tmp_path, ["slow"])[0]["slow"] == {1: folder / "slow_01.npz"}
+    (folder / "slow_1.npz").touch()
+    with pytest.raises(MeasurementError, match="replicate 1 has more than one scan"):
+        pile_files(tmp_path, ["slow"])
+
+
 @pytest.mark.parametrize("head", ["", "x{0}y{0}z\n"])
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
 @pytest.mark.parametrize(
@@ -232,6 +243,13 @@ def test_a_file_that_is_none_is_refused_in_one_line(tmp_path, name, content, lin
         read_scan(path, ScanSettings(pixel=1e-3, step=1e-5))
     assert str(refused.value).startswith(str(path))
     assert "\n" not in str(refused.value)
+
+
+def test_an_image_of_far_too_many_pixels_is_refused_before_it_is_read(tmp_path, monkeypatch):
+    Image.fromarray(np.zeros((30, 30), dtype=np.uint16)).save(tmp_path / "scan.tif")
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 400)
+    with pytest.raises(MeasurementError, match="more than 800 pixels; allowed: up to"):
+        read_scan(tmp_path / "scan.tif", ScanSettings(pixel=1e-3, step=1e-5))
 
 
 def test_a_scan_without_a_bare_plate_asks_for_the_plane():

@@ -129,6 +129,8 @@ def test_parameters_by_their_intervals(planted, monkeypatch):
     assert (answer(0.076, 0.02, True), answer(0.0765, 0.02, True)) == ("same", "moved")
     assert answer(0.1, 0.3, False) == "cannot tell"
     assert answer(0.7, 0.3, False) == "moved"
+    # A target out of reach leaves no interval, twice alike.
+    assert answer(0.0, math.nan, False) == "same"
 
 
 def estimate(value, half, identified):

@@ -66,6 +66,15 @@ def test_a_change_of_stiffness_goes_on_where_it_was():
     same(drive(resumed(batch, 0, stiffer, kept)).record(), whole)
 
 
+def test_a_pour_that_was_interrupted_after_its_end_gives_its_record():
+    batch = Batch(capacity_for([HEAP], 1))
+    pour = drive(Pour(batch, 0, HEAP, 5))
+    whole, kept = pour.record(), checkpoint_of(pour)
+    ((job, record),) = run_queue(deque([Job(HEAP, 5, interrupted=kept)]), [HEAP], worlds=1)
+    assert job.seed == 5
+    same(record, whole)
+
+
 @pytest.mark.slow
 def test_in_another_slot_among_other_pours():
     batch = Batch(capacity_for([HEAP], 1))

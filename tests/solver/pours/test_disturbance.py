@@ -10,6 +10,7 @@ from solver.engine.world import SUMMARY_COLUMNS, Batch
 from solver.params import ParameterError
 from solver.pours.checkpoint import checkpoint_of, keep, put_back
 from solver.pours.disturbance import PIECES, Pull, Shake, Tap
+from solver.pours.parameter_ramp import RAMP_TIME
 from solver.pours.pour import Pour
 from solver.pours.record import Outcome
 from solver.pours.run import capacity_for
@@ -59,6 +60,23 @@ def advance(pour, seconds):
     while left > 0 and (steps := pour.steps_due(left)) > 0:
         pour.after(steps, pour.batch.advance(np.array([steps], dtype=np.int32))[0])
         left -= steps
+
+
+def test_the_plate_ends_where_it_began_though_steps_grow_in_its_last_piece(resting):
+    softer = with_values(slab(), {"material.rubber.shear_modulus": 1e6, "material.steel.shear_modulus": 1e6})
+    before, piece = resting.dt, TAP.duration / PIECES
+    resting.ramp_to(softer)
+    # The ramp, as long as the tap, ends in the tap's last piece.
+    assert TAP.duration == RAMP_TIME
+    advance(resting, 0.4 * piece)
+    resting.move_plate(TAP)
+    while resting.disturbance:
+        steps = resting.steps_due()
+        resting.after(steps, resting.batch.advance(np.array([steps], dtype=np.int32))[0])
+    assert resting.dt > 5.0 * before
+    # What one step more or less makes at the speed of the last piece.
+    speed = TAP.amplitude * 2.0 * math.pi / TAP.duration
+    assert abs(resting.surface_poses()[0, 2]) < resting.dt * speed
 
 
 @pytest.mark.parametrize(("motion", "axis"), [(TAP, 2), (SHAKE, 0)], ids=["tap", "shake"])

@@ -9,7 +9,7 @@ import pytest
 from solver.params import ParameterError
 from solver.rigs import BENCH_RIGS
 from solver.scenes.material_file import load_material, with_settings
-from solver.single_body import BENCH_TESTS, run_bench_test
+from solver.single_body import BENCH_TESTS, compression, run_bench_test
 from solver.single_body.drop_plate_45 import PlateRebound, paper_estimate, restitution
 from tests.explorer.beads import GLASS, MASS, STEEL, bead_scene
 from tests.explorer.beads import RADIUS as BEAD
@@ -127,6 +127,20 @@ def test_squeezing_and_shearing_return_the_contact_moduli(shear):
         found = result.quantity(name)
         assert found.reference == pytest.approx(expected)
         assert found.value == pytest.approx(expected, rel=0.01)
+
+
+def test_shearing_ends_at_the_wanted_share_of_sliding(monkeypatch):
+    reached, shear = [], compression._shear
+
+    def noted(*arguments):
+        slip, tangential = shear(*arguments)
+        reached.append(tangential[-1])
+        return slip, tangential
+
+    monkeypatch.setattr(compression, "_shear", noted)
+    result = run_bench_test(bead_on("compression", 0.3))
+    # Up to micro-slip: Mindlin's spring in steps, the preload as it was when squeezing ended.
+    assert reached[0] == pytest.approx(0.2 * 0.3 * dict(result.series)["force_N"][-1], rel=0.03)
 
 
 def test_the_apparent_modulus_is_that_of_equation_1_and_no_constant():
