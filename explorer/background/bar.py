@@ -7,20 +7,20 @@ from typing import IO
 
 
 class Bar:
-    """A bar in the last line of a terminal, or below a notebook's cell; what is printed meanwhile stands above it."""
+    """A bar in the last line of a terminal, or below a notebook's cell; printed lines appear above it."""
 
     def __init__(self, file: IO[str] | None = None) -> None:
-        # Imported where it is used: the page reads progress, and has no terminal.
+        # Imported only where it is used: the page reads progress, and has no terminal.
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn
 
         console = Console(file=file)
-        # On one screen lines go above the bar; what goes into a file or a pipe must not end on the screen.
+        # On the same screen, lines go above the bar; output to a file or a pipe must not end up on the screen.
         one_screen = sys.stdout.isatty()
         shown = console.is_terminal or console.is_jupyter
         columns = TextColumn("{task.description}"), BarColumn()
-        # Drawn when there is something new, without a thread of its own: Taichi's kernels are kept at once only where
-        # there is one thread (`solver.backend.keep_compiled`).
+        # Drawn when there is something new, without a thread of its own: Taichi's kernels are kept at once only if
+        # there is a single thread (`solver.backend.keep_compiled`).
         self._progress = Progress(
             *columns,
             console=console,
@@ -32,10 +32,10 @@ class Bar:
         self._task = self._progress.add_task("", total=None)
 
     def show(self, state: str, done: float, planned: float) -> None:
-        """``done`` of ``planned``; as long as nothing is planned the bar only moves."""
+        """Show ``done`` of ``planned``; while nothing is planned, the bar only moves."""
         self._progress.start()
         self._progress.update(self._task, description=state, completed=done, total=planned or None, refresh=True)
 
     def close(self) -> None:
-        """Take it away."""
+        """Remove the bar."""
         self._progress.stop()

@@ -1,6 +1,6 @@
-"""What a command of the command line prints, for a page that waits for it in a thread while the solver runs beside it.
+"""Output of a command-line command, for a page that waits for it in a thread while the solver runs beside it.
 
-A scene of the page reaches such a command as a material file.
+Such a command receives a scene of the page as a material file.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from explorer.scene.text import material_toml
 from solver import Scene
 
 FAILURE = 1
-"""Exit code of a command that has done its work and has no good news."""
+"""Exit code of a command that has done its work, with a negative result."""
 LONGEST_LINE = 300
 TITLE_LETTERS = 20
 
@@ -30,12 +30,12 @@ def command_output(
     hear: Callable[[str], None] = lambda line: None,
     begun: Callable[[subprocess.Popen[str]], None] = lambda process: None,
 ) -> str:
-    """Standard output of ``program arguments``, which gives way to everything that a person looks at.
+    """Standard output of ``program arguments``, run at lower priority than everything that a user looks at.
 
-    ``hear`` is called with every line of it as it comes, in the caller's thread, and before them ``begun`` with the
-    process, which may be killed from another one.
-    A command that ends with ``FAILURE`` and has printed something has an answer too. Raises CommandError with the last
-    line of any other that does not end well. The command does not outlive this process.
+    ``begun`` is called first, with the process, which may be killed from another thread. ``hear`` is called with every
+    line of output as it arrives, in the caller's thread.
+    A command that ends with ``FAILURE`` and has printed something also counts as answered. For any other failure,
+    CommandError is raised with the command's last error line. The command does not outlive this process.
     """
     lines = []
     with (
@@ -68,6 +68,6 @@ def command_output(
 
 
 def kept_scene(scene: Scene, folder: Path) -> Path:
-    """``scene`` as a material file in ``folder``, under a name of its contents."""
+    """Write ``scene`` as a material file in ``folder``, under a name that follows from its contents."""
     text = material_toml(scene, f"{scene.title}, as it was poured on the page. SI.")
     return kept_file(f"{scene.title[:TITLE_LETTERS]}.toml", text.encode(), folder, (".toml",))

@@ -1,7 +1,7 @@
-"""A command of the command line in a process of its own.
+"""A command-line command in a process of its own.
 
 It has lower priority, so that the live pour stays smooth. The command writes ``progress.jsonl`` into its output folder,
-one `explorer.background.events.ProgressEvent` per line, which is all that is read here.
+one `explorer.background.events.ProgressEvent` per line; nothing else of it is read here.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from explorer.priority import BACKGROUND, lowered, session_gives_way
 CommandState = Literal["idle", "running", "paused", "cancelled", "finished", "failed"]
 
 CANCEL_WAIT = 5.0
-"""Seconds that a cancelled command has to write what it has, before it is ended for good."""
+"""Seconds that a cancelled command has to write what it has, before it is killed."""
 LOCK_WAIT = 1.0
-"""Seconds that the folder of a command of our own, which has ended, may stay locked by its workers."""
+"""Seconds for which the workers of one of our own commands may keep its folder locked after it has ended."""
 PROGRAM = (sys.executable, "-m", "explorer")
 """How the command line is called."""
 
 
 @dataclass(frozen=True)
 class CommandStatus:
-    """How far a command is. ``lines`` are partial results, one per finished stage; ``tried`` as in `with_run`."""
+    """How far a command has got. ``lines``: partial results, one per finished stage; ``tried``: as in `with_run`."""
 
     state: CommandState
     stage: str = ""
@@ -48,7 +48,7 @@ class CommandStatus:
 
     @property
     def alive(self) -> bool:
-        """True while the command's process is there, at work or paused."""
+        """True while the command's process exists, running or paused."""
         return self.state in ("running", "paused")
 
 
@@ -60,26 +60,27 @@ HERE = "this machine"
 
 
 class PourPlace:
-    """Where commands pour that are started from now on: on this machine, or on the workers of a Dask scheduler.
+    """Where commands started from now on pour: on this machine, or on the workers of a Dask scheduler.
 
-    Whoever may name a scheduler makes this machine run what that scheduler sends: Dask's messages hold code. So the
-    address is given by who starts the server, and a browser can only choose between it and this machine.
+    Whoever names the scheduler can make this machine run what that scheduler sends, because Dask's messages hold code.
+    Therefore the person who starts the server gives the address, and a browser can only choose between it and this
+    machine.
     """
 
     def __init__(self, scheduler: str = "") -> None:
         self.offered = (scheduler, HERE) if scheduler else (HERE,)
-        """What there is to choose from."""
+        """The places to choose from."""
         self.chosen = self.offered[0]
 
     def choose(self, name: str) -> None:
-        """Pour there from the next command on. Raises BackgroundError for what is not offered."""
+        """Pour at ``name`` from the next command on. Raises BackgroundError if it is not offered."""
         if name not in self.offered:
             raise BackgroundError(f"pour on: {name!r} is not one of {', '.join(self.offered)}")
         self.chosen = name
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """What a command is told."""
+        """Command-line arguments for this place."""
         return () if self.chosen == HERE else ("--scheduler", self.chosen)
 
 
@@ -87,8 +88,8 @@ class CommandProcess:
     """One command at a time as a child process.
 
     Args:
-        what: what a run of it is called, such as "study".
-        endings: exit code of a finished command → what to say before the path of the report.
+        what: what one run is called, such as "study".
+        endings: exit code of a finished command → text before the path of the report.
         program: how the command line is called.
     """
 
@@ -104,21 +105,21 @@ class CommandProcess:
         """Output folder of the command that was started last."""
 
     def start(self, out: Path, arguments: Sequence[str]) -> None:
-        """Start a command with the new output folder ``out``; ``arguments`` without it. Raises BackgroundError."""
+        """Start the command ``arguments``, whose new output folder is ``out``. Raises BackgroundError."""
         self.refuse_while_running()
         self._read = 0
         self._launch(out, arguments)
 
     def resume(self, out: Path, arguments: Sequence[str]) -> None:
-        """Go on in ``out``, where a command was stopped. Raises BackgroundError."""
+        """Continue in ``out``, where a command was stopped. Raises BackgroundError."""
         self.refuse_while_running()
-        # A resumed command tells every stage again, so what it said before it was stopped is dropped.
+        # A resumed command reports every stage again, so what it reported before it was stopped is dropped.
         progress = out / PROGRESS
         self._read = progress.stat().st_size if progress.is_file() else 0
         self._launch(out, (*arguments, "--resume"))
 
     def cancel(self) -> None:
-        """Ask the command to stop; :meth:`status` ends it for good if it has not after ``CANCEL_WAIT``."""
+        """Ask the command to stop; :meth:`status` kills it if it has not stopped after ``CANCEL_WAIT``."""
         if self._process is not None and self._process.poll() is None:
             self.go_on()
             self._process.terminate()
@@ -126,14 +127,14 @@ class CommandProcess:
             self._status = replace(self._status, message="stopping")
 
     def pause(self) -> None:
-        """Let the command stand still, workers and all; it keeps its memory and gives the cores free."""
+        """Suspend the command with its workers; it keeps its memory and frees the cores."""
         if self.status().state == "running" and self._process is not None:
             os.killpg(self._process.pid, signal.SIGSTOP)
             self._waker = _waker(self._process.pid)
             self._status = replace(self._status, state="paused")
 
     def go_on(self) -> None:
-        """Let a paused command go on."""
+        """Let a paused command continue."""
         if self._status.state == "paused" and self._process is not None:
             os.killpg(self._process.pid, signal.SIGCONT)
             if self._waker is not None:
@@ -141,7 +142,7 @@ class CommandProcess:
             self._status = replace(self._status, state="running")
 
     def close(self) -> None:
-        """Cancel what runs and wait for its end."""
+        """Cancel the running command and wait for its end."""
         self.cancel()
         while self.status().alive:
             time.sleep(0.05)
@@ -151,7 +152,7 @@ class CommandProcess:
         if self._process is None:
             return self._status
         code = self._process.poll()
-        # Read after asking: what a process that is over wrote last is in the file by now.
+        # Read after polling: by then the file holds the last lines of a process that has ended.
         self._take_progress()
         if code is not None:
             self._process = None
@@ -166,14 +167,14 @@ class CommandProcess:
             raise BackgroundError(f"a {self._what} is running already; cancel it first")
 
     def _launch(self, out: Path, arguments: Sequence[str]) -> None:
-        # Workers of a command of our own that has just ended may hold the lock for a moment longer.
+        # Workers of one of our own commands that has just ended may hold the lock a moment longer.
         patience = LOCK_WAIT if out == self.out else 0.0
         self.out, self._command = out, arguments[0]
         with self._log().open("ab") as log:
-            # The child inherits the lock with the open file, and holds it to its end, whatever becomes of the page.
+            # The child inherits the lock with the open file and holds it until it ends, whatever happens to the page.
             if not _locked(log, patience):
                 raise BackgroundError(f"{out}: another page's command is running there; wait until it ends")
-            # A session of its own: Ctrl-C for the page must not cut a run in two, cancel() ends it in order.
+            # A session of its own: Ctrl-C for the page must not interrupt a run; cancel() ends it in an orderly way.
             self._process = subprocess.Popen(
                 lowered((*self._program, *arguments), BACKGROUND),
                 stdin=subprocess.DEVNULL,
@@ -186,7 +187,7 @@ class CommandProcess:
         self._status = CommandStatus("running")
 
     def _log(self) -> Path:
-        # Beside the output folder: that one has to be empty for a new command.
+        # Beside the output folder, which has to be empty for a new command.
         return Path(f"{self.out}.log")
 
     def _ending(self, code: int) -> dict[str, Any]:
@@ -203,7 +204,7 @@ class CommandProcess:
         log = self._log()
         try:
             lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
-        except OSError as error:  # taken away, perhaps with the folder that it was in
+        except OSError as error:  # removed, perhaps with its folder
             return f"{log}: {error.strerror or error}"
         return lines[-1][:300] if lines else f"no output; see {log}"
 
@@ -218,19 +219,19 @@ class CommandProcess:
 
 
 def _waker(group: int) -> subprocess.Popen[bytes]:
-    """A process that lets the processes of ``group`` go on when its input ends: when this process does, however.
+    """A process that lets ``group`` continue when its input ends, which happens however this process ends.
 
-    Otherwise a page that is killed would leave a paused command behind that nobody can wake.
+    Otherwise a page that is killed would leave behind a paused command that nobody can wake.
     """
     wait = ("sh", "-c", 'read -r nothing; kill -s CONT -- "-$1"', "waker", str(group))
     return subprocess.Popen(wait, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True)
 
 
 def advanced(status: CommandStatus, line: bytes) -> CommandStatus:
-    """``status`` after one line of ``progress.jsonl``; a line that is no such object leaves it as it is."""
+    """``status`` after one line of ``progress.jsonl``; a line that is not an event leaves it unchanged."""
     try:
         event = ProgressEvent.from_dict(json.loads(line))
-    except ValueError:  # no JSON, or JSON of something else
+    except ValueError:  # not JSON, or not an event
         return status
     return replace(
         status,
@@ -245,7 +246,7 @@ def advanced(status: CommandStatus, line: bytes) -> CommandStatus:
 
 
 def _locked(file: IO[bytes], patience: float) -> bool:
-    """Lock ``file`` for this process and its children, waiting for at most ``patience`` seconds; True if it is."""
+    """Lock ``file`` for this process and its children, waiting at most ``patience`` seconds; True on success."""
     end = time.monotonic() + patience
     while True:
         try:
@@ -259,5 +260,5 @@ def _locked(file: IO[bytes], patience: float) -> bool:
 
 
 def _whole_lines(stream: IO[bytes]) -> list[bytes]:
-    """Lines that end in a newline; the writer may be in the middle of the last one."""
+    """The complete lines: the writer may be in the middle of the last one."""
     return [line for line in stream if line.endswith(b"\n")]

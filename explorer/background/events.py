@@ -1,7 +1,7 @@
-"""The events that a long command tells, and what its readers make of them: stages, failed runs, what replaced them.
+"""The events that a long command reports, and what its readers derive: stages, failed runs, and their replacements.
 
-`explorer.background.progress` makes them, `explorer.background.reporter` carries them: to ``progress.jsonl`` for the
-page, and to standard output for CI.
+`explorer.background.progress` makes the events, `explorer.background.reporter` writes them: to ``progress.jsonl`` for
+the page, and to standard output for CI.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from doe.run_records import Run
 
 PROGRESS = "progress.jsonl"
-"""In the output folder of the command."""
+"""File in the output folder of the command."""
 MOST_TRIED = 2000
-"""Failed runs and their replacements that are remembered."""
+"""Failed runs and replacements that are remembered at most."""
 EventKind = Literal["start", "pour", "stage", "end"]
 Ending = Literal["finished", "failed", "interrupted"]
 FIRST = "beginning"
-"""Stage of what is told before the first run."""
+"""Stage of what is reported before the first run."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class TriedRun(Record):
 
     @staticmethod
     def of(stage: str, run: Run | Ended) -> TriedRun:
-        """What is told of a run."""
+        """What is reported about a run."""
         return TriedRun(
             stage,
             run.title,
@@ -110,7 +110,7 @@ class ProgressEvent(Record):
 
 @dataclass(frozen=True)
 class StageProgress:
-    """Runs of one stage, and what it found, if it has said so."""
+    """Runs of one stage, and what it found, if reported."""
 
     name: str
     done: int = 0
@@ -120,7 +120,7 @@ class StageProgress:
 
 @dataclass(frozen=True)
 class FailedRun:
-    """A run without a pile and what became of its replicate: ``replaced_by`` is the next seed tried, if any."""
+    """A run without a pile, and its replacement: ``replaced_by`` is the run with the next seed tried, if any."""
 
     run: TriedRun
     replaced_by: TriedRun | None
@@ -130,7 +130,7 @@ def with_event(stages: tuple[StageProgress, ...], event: ProgressEvent) -> tuple
     """``stages`` after one event."""
     stage, counts = event.stage or FIRST, event.stages
     known = {one.name: one for one in stages}
-    if counts is None:  # a command that counts the runs of its present stage only
+    if counts is None:  # a command that counts only the runs of its present stage
         told = event.planned > 0 or event.line is not None or stage in known
         counts = {stage: (event.done, event.planned)} if told else {}
     for name, (done, planned) in counts.items():
@@ -142,7 +142,7 @@ def with_event(stages: tuple[StageProgress, ...], event: ProgressEvent) -> tuple
 
 
 def with_run(tried: tuple[TriedRun, ...], event: ProgressEvent) -> tuple[TriedRun, ...]:
-    """``tried``, runs that failed or replaced one that did, after one event."""
+    """``tried`` (runs that failed, or replaced one that did) after one event."""
     run = event.run
     if run is None or (run.valid and run.attempt == 0):
         return tried
@@ -150,7 +150,7 @@ def with_run(tried: tuple[TriedRun, ...], event: ProgressEvent) -> tuple[TriedRu
 
 
 def failures(tried: tuple[TriedRun, ...]) -> tuple[FailedRun, ...]:
-    """Every failed run with the one that took its place, newest first."""
+    """Every failed run with its replacement, newest first."""
     by_place = {(run.stage, run.label, run.replicate, run.attempt): run for run in tried}
     return tuple(
         FailedRun(run, by_place.get((run.stage, run.label, run.replicate, run.attempt + 1)))
@@ -160,5 +160,5 @@ def failures(tried: tuple[TriedRun, ...]) -> tuple[FailedRun, ...]:
 
 
 def given_up(tried: tuple[TriedRun, ...], tries: int) -> tuple[TriedRun, ...]:
-    """Replicates that are left without a valid run after ``tries`` seeds: the last run of each."""
+    """Replicates without a valid run after ``tries`` seeds: the last run of each."""
     return tuple(run for run in tried if not run.valid and run.attempt + 1 >= tries)

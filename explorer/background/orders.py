@@ -1,8 +1,8 @@
-"""Commands of one kind in the background, such as the studies: one runs at a time, others wait for it.
+"""Commands of one kind in the background, such as studies: one runs at a time, the others wait in a queue.
 
-The next order begins when the one before has come to its end: a report or a failure. A command that was cancelled
-leaves the line waiting for the next start, because who cancels wants quiet; so does an order that cannot begin, which
-is told until then.
+The next order begins when the one before has ended, with a report or a failure. After a cancelled command the queue
+waits for the next start, because whoever cancels wants quiet. It also waits after an order that cannot begin, and until
+then the status says why.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ class BackgroundOrders(Protocol):
 
     @property
     def out(self) -> Path | None:
-        """Output folder of the command started last, None before the first."""
+        """Output folder of the command started last; None before the first."""
 
     def clear_queue(self) -> None:
-        """Forget the orders that wait."""
+        """Forget the waiting orders."""
 
     def waiting(self) -> tuple[str, ...]:
-        """The orders that wait, next one first, in words."""
+        """The waiting orders, next one first, in words."""
 
     def pause(self) -> None:
-        """Let the command that runs stand still."""
+        """Suspend the running command."""
 
     def go_on(self) -> None:
-        """Let it go on."""
+        """Let the paused command continue."""
 
     def cancel(self) -> None:
-        """Stop it; finished pours are kept."""
+        """Stop the command; finished pours are kept."""
 
     def status(self) -> CommandStatus:
         """State, progress and partial results."""
@@ -52,7 +52,7 @@ class BackgroundOrders(Protocol):
 class OrderedCommands(ABC, Generic[Order]):
     """Orders for ``process``, each with an output folder in ``folder``; a finished one has the file ``result`` there.
 
-    ``what``: the word for several of them, such as "studies".
+    ``what``: the plural for the orders, such as "studies".
     """
 
     def __init__(self, process: CommandProcess, folder: Path, result: str, what: str) -> None:
@@ -60,7 +60,7 @@ class OrderedCommands(ABC, Generic[Order]):
         self._line: deque[Order] = deque()
         self._follow_up = False
         self._refused = ""
-        """Why the next order could not begin, until another command does or the line is cleared."""
+        """Why the next order could not begin; kept until another command begins or the queue is cleared."""
         self.cancel, self.pause, self.go_on = process.cancel, process.pause, process.go_on
 
     @property
@@ -73,21 +73,21 @@ class OrderedCommands(ABC, Generic[Order]):
         return finished(self._folder, self._result)
 
     def waiting(self) -> tuple[str, ...]:
-        """The orders that wait, next one first, in words."""
+        """The waiting orders, next one first, in words."""
         return tuple(map(self._in_words, self._line))
 
     def clear_queue(self) -> None:
-        """Forget the orders that wait."""
+        """Forget the waiting orders."""
         self._line.clear()
         self._refused = ""
 
     def close(self) -> None:
-        """Cancel what runs and wait for its end."""
+        """Cancel the running command and wait for its end."""
         self.clear_queue()
         self._process.close()
 
     def status(self) -> CommandStatus:
-        """Status of the process; begins the next order where a command has ended since the last look."""
+        """Status of the process; begins the next order if a command has ended since the last call."""
         status = self._process.status()
         if status.alive:
             self._follow_up = True
@@ -97,7 +97,7 @@ class OrderedCommands(ABC, Generic[Order]):
                 try:
                     self._begin_next()
                 except (ValueError, OSError) as error:
-                    # Nobody pressed a button that could tell: the status does, and the order still waits.
+                    # No button was pressed that could report it, so the status does; the order keeps waiting.
                     self._refused = f"the next one cannot start: {error}; the queue waits for another start"
                 status = self._process.status()
         return replace(status, state="failed", message=self._refused) if self._refused else status
@@ -108,10 +108,10 @@ class OrderedCommands(ABC, Generic[Order]):
 
     @abstractmethod
     def _in_words(self, order: Order) -> str:
-        """``order`` as it is told while it waits."""
+        """``order`` as it is listed while it waits."""
 
     def _add(self, order: Order) -> None:
-        """Begin ``order`` after those before it, at once if nothing runs. Raises BackgroundError if it is full."""
+        """Queue ``order``; begin at once if nothing runs. Raises BackgroundError if the queue is full."""
         if len(self._line) >= MOST_WAITING:
             raise BackgroundError(f"{MOST_WAITING} {self._what} are already waiting, the most that are kept")
         self._line.append(order)
@@ -119,16 +119,16 @@ class OrderedCommands(ABC, Generic[Order]):
             self._begin_next()
 
     def _begin_next(self) -> None:
-        """Begin the first order; it waits on where that fails."""
+        """Begin the first order; if that fails, it keeps waiting."""
         self._begin(self._line[0])
         self._line.popleft()
 
     def _start(self, out: Path, arguments: list[str]) -> None:
-        """Start a command; its end lets the next order begin, even if nobody looks in between."""
+        """Start a command; its end lets the next order begin, even if nobody asks for the status in between."""
         self._process.start(out, arguments)
         self._follow_up, self._refused = True, ""
 
     def _go_on_in(self, out: Path, arguments: list[str]) -> None:
-        """Resume one in its output folder; the same holds of its end."""
+        """Resume a command in its output folder; its end, too, lets the next order begin."""
         self._process.resume(out, arguments)
         self._follow_up, self._refused = True, ""

@@ -1,4 +1,4 @@
-"""Output folders of commands in the background: their names, which of them hold a result, and the result as JSON."""
+"""Output folders of background commands: their names, which of them hold a result, and the result as JSON."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from solver.assets import own_path
 Read = TypeVar("Read", bound=Document)
 
 STAMP = r"\d{8}-\d{6}(?:-\d+)?"
-"""Date, time and perhaps a number: the end of an output folder's name."""
+"""End of an output folder's name: date, time and perhaps a number."""
 
 
 def new_folder(folder: Path, stem: str) -> Path:
-    """A name in ``folder``, which is made, that nobody has: ``<stem>-<date>-<time>``, with a number if need be."""
+    """An unused path ``<stem>-<date>-<time>`` in ``folder``, with a number if needed; ``folder`` is created."""
     folder.mkdir(parents=True, exist_ok=True)
     dated = f"{stem}-{time.strftime('%Y%m%d-%H%M%S')}"
     names = [dated, *(f"{dated}-{k}" for k in range(2, 100))]
@@ -32,9 +32,9 @@ def new_folder(folder: Path, stem: str) -> Path:
 
 @contextlib.contextmanager
 def kept_for_one(folder: Path) -> Iterator[None]:
-    """Make ``folder`` and keep other commands out of it while one writes there; however it ends, the folder is free.
+    """Create ``folder`` and keep other commands out while this one writes there; it is freed however this one ends.
 
-    Raises CommandError where another one is at work in it.
+    Raises CommandError if another command is writing there.
     """
     folder.mkdir(parents=True, exist_ok=True)
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
@@ -57,7 +57,7 @@ def finished(folder: Path, result: str) -> tuple[Path, ...]:
 
 
 def newest_unfinished(folder: Path, stems: Sequence[str], result: str) -> tuple[Path, str] | None:
-    """The newest of the folders ``<stem>-<date>-<time>`` that holds no file ``result``, and its stem."""
+    """The newest of the folders ``<stem>-<date>-<time>`` without a file ``result``, and its stem; None if none."""
     name = re.compile(rf"({'|'.join(map(re.escape, stems))})-({STAMP})")
     named = [(match, one) for one in folder.glob("*/") if (match := name.fullmatch(one.name))]
     stopped = [(match[2], match[1], one) for match, one in named if not (one / result).exists()]
@@ -77,11 +77,11 @@ class ResultFile:
 
     @property
     def version(self) -> tuple[Path, int, int] | None:
-        """Changes whenever the content does; None where there is none."""
+        """Changes whenever the content does; None if there is no content."""
         return self._stamp
 
     def read(self, folder: Path | None) -> dict[str, Any] | None:
-        """The file's object; None where there is no folder, no file, or no whole object in it."""
+        """The JSON object in the file; None if there is no folder, no file, or no complete object in it."""
         found = None if folder is None else next((f for n in self._names if (f := folder / n).is_file()), None)
         stamp = None
         if found is not None:
@@ -90,7 +90,7 @@ class ResultFile:
                 stamp = (found, seen.st_mtime_ns, seen.st_size)
                 if stamp != self._stamp:
                     self._content = _object(found)
-            except (OSError, ValueError):  # taken away or not JSON: as if it were not there
+            except (OSError, ValueError):  # removed, or not JSON: as if it did not exist
                 stamp = None
         if stamp is None:
             self._content = None
@@ -99,9 +99,9 @@ class ResultFile:
 
 
 def read_result(kind: type[Read], folder: Path, name: str) -> Read | None:
-    """The result in the file ``name`` of ``folder``; None where there is none.
+    """The result in the file ``name`` of ``folder``; None if there is none.
 
-    Raises CommandError, in one line, for one of another version.
+    Raises CommandError, in one line, for a result of another version.
     """
     content = ResultFile(name).read(folder)
     try:
@@ -111,7 +111,7 @@ def read_result(kind: type[Read], folder: Path, name: str) -> Read | None:
 
 
 def checked_folder(text: str, name: str) -> Path:
-    """The folder that a person typed, which has to hold a readable file ``name``. Raises CommandError."""
+    """The folder that the user typed, which has to hold a readable file ``name``. Raises CommandError."""
     if not text.strip():
         raise CommandError(f"name a folder that holds {name}")
     folder = own_path(text.strip()).absolute()

@@ -1,4 +1,4 @@
-"""How a long command counts its runs for the events that it tells, and estimates the time left."""
+"""How a long command counts its runs for the events that it reports, and estimates the time left."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class RunProgress:
         self._last: float | None = None
 
     def compiling(self) -> None:
-        """The study has begun; the first run shows itself only after the solver is compiled."""
+        """The study has begun; its first run is reported only after the solver has been compiled."""
         self._tell("compiling the solver", event="start")
 
     def run(self, stage: str, run: Run, remaining: int) -> None:
@@ -45,16 +45,16 @@ class RunProgress:
         self._tell(stage, run=TriedRun.of(stage, run), event="pour")
 
     def went_on(self) -> None:
-        """The study was paused and goes on: the time since the last run says nothing about the rate."""
+        """The study was paused and continues: the time since the last run does not count for the rate."""
         if self._last is not None:
             self._last = self._clock()
 
     def stage(self, stage: str, line: str) -> None:
-        """A stage has ended with this finding."""
+        """``stage`` has ended with the finding ``line``."""
         self._tell(stage, line)
 
     def eta_s(self) -> float | None:
-        """Seconds left at the rate so far; None before the first run that was really made."""
+        """Seconds left at the rate so far; None before the first run that was not reused."""
         if not self._fresh:
             return None
         rate = self._fresh / max(1e-9, self._working)
@@ -79,27 +79,27 @@ class RunProgress:
 
 
 class PourProgress:
-    """Progress of a diagnosis: which part of its loop runs, and how many pours that still needs."""
+    """Progress of a diagnosis: which part of its loop is running, and how many pours that part still needs."""
 
     def __init__(self, reporter: Reporter) -> None:
         self._reporter = reporter
         self._done, self._part, self._part_began = 0, "", 0.0
 
     def compiling(self) -> None:
-        """The diagnosis has begun; the first pour shows itself only after the solver is compiled."""
+        """The diagnosis has begun; its first pour is reported only after the solver has been compiled."""
         self._tell("compiling the solver", 0, event="start")
 
     def pour(self, part: str, left: int, ended: Ended) -> None:
-        """A pour of ``part`` has ended so; ``left`` are still to come."""
+        """A pour of ``part`` has ended as ``ended`` says; ``left`` are still to come."""
         if part != self._part:
             self._part, self._part_began, self._done = part, self._reporter.elapsed, 0
         self._done += 1
-        # From the first pour's end on: what came before it is compilation.
+        # Timed from the end of the first pour: the time before is compilation.
         eta = left * (self._reporter.elapsed - self._part_began) / (self._done - 1) if self._done > 1 else None
         self._tell(part, left, eta, run=TriedRun.of(part, ended), event="pour")
 
     def stage(self, line: str) -> None:
-        """A part has ended with this finding."""
+        """A part has ended with the finding ``line``."""
         self._tell(self._part, 0, line=line)
 
     def _tell(
@@ -124,16 +124,16 @@ class PourProgress:
 
 
 class SimulatedTime:
-    """Progress within one pour, for a person: it lasts ``whole`` [s] of simulated time at most."""
+    """Progress within one pour, for the user; the pour lasts at most ``whole`` [s] of simulated time."""
 
     def __init__(self, reporter: Reporter, whole: float) -> None:
         self._reporter, self._whole = reporter, whole
         self._first: tuple[float, float] | None = None
 
     def sample(self, time: float) -> None:
-        """The pour has come to ``time`` [s]."""
+        """The pour has reached ``time`` [s]."""
         elapsed = self._reporter.elapsed
-        if self._first is None:  # what came before it is compilation
+        if self._first is None:  # the time before is compilation
             self._first = time, elapsed
         since, then = self._first
         left = (self._whole - time) * (elapsed - then) / (time - since) if time > since else None
@@ -144,18 +144,18 @@ class SetProgress(PourProgress):
     """Progress of a validation campaign: its pours, and its data sets, from which the time left follows."""
 
     def judged(self, done: int, planned: int, judged_now: int, line: str) -> None:
-        """``done`` of ``planned`` data sets are there, ``judged_now`` of them by this run of the command."""
+        """``done`` of ``planned`` data sets are judged, ``judged_now`` of them by this run of the command."""
         eta = (planned - done) * self._reporter.elapsed / judged_now
         told = ProgressEvent(stage="data sets", done=done, planned=planned, eta_s=eta, line=line)
         self._reporter.tell(told, "", f"{line}; {done} of {planned} data sets{time_left(eta)}")
 
     def watched(self, pours: Pours) -> Pours:
-        """``pours`` of which those that diverge are told."""
+        """``pours``, with those that diverge reported."""
         return self._reporter.watched(pours)
 
 
 def time_left(eta_s: float | None) -> str:
-    """Such as ", about 12 min left"; empty where it is not known."""
+    """Text such as ", about 12 min left"; empty if the time is not known."""
     if eta_s is None:
         return ""
     return f", about {eta_s / 60:.0f} min left" if eta_s > 90 else f", about {eta_s:.0f} s left"
@@ -163,7 +163,7 @@ def time_left(eta_s: float | None) -> str:
 
 @contextmanager
 def told_of_pauses(went_on: Callable[[], None]) -> Iterator[None]:
-    """Call ``went_on`` whenever this process goes on after a pause (SIGCONT), which only its main thread can hear."""
+    """Call ``went_on`` whenever this process continues after a pause (SIGCONT); no effect outside its main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

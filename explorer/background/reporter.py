@@ -1,13 +1,13 @@
-"""What a long command tells while it runs: lines to a person, events to the page and to CI, and a log.
+"""What a long command reports while it runs: lines for the user, events for the page and CI, and a log.
 
 There is one stream of events (`explorer.background.events.ProgressEvent`, one JSON object per line): the page reads
-it from ``progress.jsonl`` in the output folder, CI from standard output (``--json``). The log is that of the standard
-library: the packages log by ``logging.getLogger(__name__)``, and while a command runs its records are JSON lines in
-``log.jsonl`` of the output folder:
+it from ``progress.jsonl`` in the output folder, CI from standard output (``--json``). Logging uses the standard
+library: the packages log with ``logging.getLogger(__name__)``, and while a command runs, the records are written as
+JSON lines to ``log.jsonl`` in the output folder:
 
     {"time": ISO 8601 UTC, "level": "info", "run_id": text, "logger": module, "message": text, …}
 
-with "stage", "seed", "outcome", "wall_s" and "reused" for a pour, and "traceback" for an error of the program.
+with "stage", "seed", "outcome", "wall_s" and "reused" for a pour, and "traceback" for an error in the program.
 """
 
 from __future__ import annotations
@@ -37,27 +37,27 @@ from explorer.scene.text import material_toml
 from solver import Job, PourBrokeOff, Record, Scene
 
 LOG = "log.jsonl"
-"""In the output folder of the command."""
+"""File in the output folder of the command."""
 PACKAGES = ("explorer", "doe", "solver")
 LEVELS = ("debug", "info", "warning", "error")
 EVERY = 20.0
 MOST_SCENES = 10
-"""Scenes of pours that diverged that one command writes: where many do, they do for one reason."""
+"""Scenes of diverged pours that one command writes at most: if many diverge, they have one reason in common."""
 
 _log = logging.getLogger(__name__)
 _run_id: ContextVar[str] = ContextVar("run_id", default="")
 
 
 class Reporter:
-    """Tells all readers of one run of a command; a context, whose end is told however it comes.
+    """Reports one run of a command to all its readers; a context manager that reports the end, however it comes.
 
     Args:
-        command: its name.
-        say: takes a line for a person.
-        events: every event is written there as a line of JSON; None for nowhere but the output folder.
-        bar: where a bar is shown if that is a terminal; standard output by default.
-        every: seconds between two lines of progress where there is no terminal.
-        clock: seconds.
+        command: name of the command.
+        say: takes a line for the user.
+        events: where every event is written as a line of JSON; None for only the output folder.
+        bar: where a bar is shown, if that is a terminal; standard output by default.
+        every: seconds between two lines of progress if there is no terminal.
+        clock: present time [s].
     """
 
     def __init__(
@@ -71,9 +71,9 @@ class Reporter:
     ) -> None:
         self.command, self.say, self._events, self._clock = command, say, events, clock
         self.run_id = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{secrets.token_hex(3)}"
-        """Of this run: a command that goes on where another one stopped has its own."""
+        """Of this run: a command that continues where another one stopped has its own."""
         self.result: Path | None = None
-        """The file that the command has left, once it is there."""
+        """The file that the command has written, once it exists."""
         self._started, self._said = clock(), 0.0
         self._out: Path | None = None
         self._last = ProgressEvent(stage="", done=0, planned=0)
@@ -101,7 +101,7 @@ class Reporter:
         return self._clock() - self._started
 
     def begin(self, out: Path | None = None, resumed: bool = False) -> None:
-        """The command is at work, in the folder ``out``: events and log are added to the files there."""
+        """The command is at work in the folder ``out``: events and log are appended to the files there."""
         self._out = out
         if out is not None:
             _end_line(out / PROGRESS)
@@ -112,7 +112,7 @@ class Reporter:
         _log.info("%s: %s", self.command, "resumed" if resumed else "started")
 
     def tell(self, event: ProgressEvent, state: str, finding: str | None = None) -> None:
-        """Tell ``event``; in words: ``finding`` where there is one, else ``state``, which is not said each time."""
+        """Report ``event``; in words by ``finding`` if given, else by ``state``, which is not shown every time."""
         scene = None if event.run is None else self._scenes.get(event.run.seed)
         self._write(replace(event, scene=scene))
         self._note(self._last)
@@ -121,7 +121,7 @@ class Reporter:
         self.show(state, event.done, event.planned, said=finding is not None)
 
     def show(self, state: str, done: float, planned: float, said: bool = False) -> None:
-        """Show a person how far it is: ``state`` in a bar, or now and then as a line; no event."""
+        """Show the user the progress: ``state`` in a bar, or now and then as a line; no event."""
         if self._bar is not None:
             self._bar.show(state, done, planned)
         elif not said and self.elapsed - self._said > self._every:
@@ -129,7 +129,7 @@ class Reporter:
             self.say(f"[{self.elapsed:6.0f} s] {state}")
 
     def watched(self, pours: Pours) -> Pours:
-        """``pours``; of one that diverges or breaks off the scene is written into the output folder, and told."""
+        """``pours``; the scene of one that diverges or breaks off is written into the output folder and reported."""
 
         def run(queue: deque[Job], room: Sequence[Scene]) -> Iterable[tuple[Job, Record]]:
             try:
@@ -146,9 +146,9 @@ class Reporter:
     def diverged(
         self, scene: Scene, seed: int, record: Record, folder: Path | None, appears_as: Path | None = None
     ) -> None:
-        """Write ``scene`` into ``folder``, where there is one, and tell how it is poured with ``seed`` again.
+        """Write ``scene`` into ``folder``, if given, and say how to pour it again with ``seed``.
 
-        ``appears_as``: name of the folder when the command is over.
+        ``appears_as``: name of the folder when the command has ended.
         """
         what = f"the pour with seed {seed} diverged: {str(record.outcome).replace('_', ' ')}, {record.message}"
         self._leave(scene, seed, what, folder, appears_as)
@@ -181,7 +181,7 @@ class Reporter:
             self._events.flush()
 
     def _note(self, event: ProgressEvent) -> None:
-        """Log what an event says."""
+        """Log an event."""
         run = event.run
         if run is not None:
             said = f"{run.stage}: {run.label}, seed {run.seed}: {run.outcome}"
@@ -202,11 +202,11 @@ class Reporter:
             outcome = "interrupted" if isinstance(error, KeyboardInterrupt) else "failed"
             told = " ".join(str(error).split()) or type(error).__name__
         last = replace(self._last, event="end", eta_s=None, line=None, run=None, scene=None)
-        # On a full disk, or with nobody who reads, the first error is the one to tell.
+        # On a full disk, or with no reader left, the first error is the one to report.
         with suppress(OSError) if error is not None else nullcontext():
             result = self.result if error is None else None
             self._write(replace(last, outcome=outcome, result=result, error=told))
-        # The traceback of what is an error of the program, not of its input or of what the runs gave.
+        # A traceback only for an error in the program, not in its input or in the outcome of runs.
         program = None if isinstance(error, ValueError | KeyboardInterrupt | StudyStopped) else error
         _log.log(
             logging.INFO if error is None else logging.ERROR,
@@ -220,52 +220,52 @@ class Reporter:
 
 
 def _end_line(file: Path) -> None:
-    """End the last line of ``file``, in whose middle a command may have been killed."""
+    """End the last line of ``file``: a command may have been killed in the middle of it."""
     if file.is_file() and not (told := file.read_bytes()).endswith(b"\n") and told:
         with file.open("a", encoding="utf-8") as stream:
             stream.write("\n")
 
 
 def end_as_by_ctrl_c() -> None:
-    """Let SIGTERM, by which the page cancels a command and CI ends one, end it as Ctrl-C does.
+    """Let SIGTERM, with which the page cancels a command and CI ends one, end it as Ctrl-C does.
 
-    The end is told then, the store is closed, and finished pours are kept.
+    The end is then reported, the store is closed, and finished pours are kept.
     """
     signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
 def reporter_of(command: str, json: bool) -> Reporter:
-    """That of a command line: events on standard output, and lines on standard error, where it asks for ``json``."""
+    """The reporter of a command line; with ``json``, events go to standard output and lines to standard error."""
 
     def say(line: str) -> None:
-        # Looked up for each line: while a bar is shown, another stream stands there that prints above it.
+        # Looked up for each line: while a bar is shown, another stream is in its place that prints above the bar.
         print(line, file=sys.stderr if json else sys.stdout, flush=True)
 
     return Reporter(command, say, sys.stdout if json else None, sys.stderr if json else sys.stdout)
 
 
 class ToPerson(logging.Handler):
-    """Says what a person has to know of the work, such as a worker that was lost; what events tell is said anyway."""
+    """Says what the user has to know, such as the loss of a worker; the reporter itself says what events report."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         super().__init__()
         self._say = say
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Say it."""
+        """Say the message."""
         if record.name != __name__:
             self._say(record.getMessage())
 
 
 class LogFile(logging.FileHandler):
-    """A log that stops no pour: what cannot be written, as on a full disk, is left out."""
+    """A log that never stops a pour: what cannot be written, for example on a full disk, is left out."""
 
     def handleError(self, record: logging.LogRecord) -> None:
-        """Go on."""
+        """Ignore the error."""
 
 
 class JsonLines(logging.Formatter):
-    """A record as a line of JSON, with what its ``fields`` hold beside the message."""
+    """A record as a line of JSON, with its ``fields`` beside the message."""
 
     def format(self, record: logging.LogRecord) -> str:
         """The line."""
@@ -284,7 +284,7 @@ class JsonLines(logging.Formatter):
 
 @contextmanager
 def logged(handler: logging.Handler, level: str) -> Iterator[None]:
-    """Have ``handler`` take what this program's packages log, from ``level`` on."""
+    """Have ``handler`` take what this program's packages log at ``level`` or above."""
     handler.setFormatter(JsonLines())
     handler.setLevel(level.upper())
     loggers = [logging.getLogger(name) for name in PACKAGES]

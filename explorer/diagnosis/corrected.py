@@ -1,7 +1,7 @@
 """The corrected model as a material file that every command takes, and as a study that calibrates it with its effect.
 
-The study's factors are the declared parameters within their measured ranges and the amplitudes of what is named within
-their 95 % intervals; its targets are numbers of the first fitted condition, each with what the declared model gave.
+The study's factors are the declared parameters within their measured ranges and the amplitudes of the named effects
+within their 95 % intervals. Its targets are numbers of the first fitted condition, each with the declared model's.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from solver import EFFECTS, OBSERVABLES, Scene, observable_names, parameters, va
 SHORT = {"pilot_runs": 6, "change_runs": 3, "ascent_replicates": 1, "verification_runs": 6} | {
     f"{part}_replicates": 1 for part in ("screening", "assumption", "scan", "surface")
 }
-"""Runs of the profile ``SHORT_PROFILE``."""
+"""Numbers of runs in the profile ``SHORT_PROFILE``."""
 TARGETS = 2
-"""Targets of the study at most: each takes part in every stage."""
+"""Maximum number of targets of the study: each takes part in every stage."""
 
 
 def corrected_toml(measurement: Measurement, diagnosis: Diagnosis) -> str:
     """The final model of ``diagnosis`` in the set-up of the first fitted condition.
 
-    Parameters are those of its fit; the effect that the verdict names (both of a pair) stands in ``[effect.<name>]``.
-    Of an ambiguous verdict it is the most probable effect, and the heading says that it is not established. Where
-    nothing is named, or held-out data took it back, it is the calibrated declared model.
+    The parameters are those of its fit. ``[effect.<name>]`` holds the effect that the verdict names (both of a pair).
+    For an ambiguous verdict this is the most probable effect, and the heading says that it is not established. If the
+    verdict names nothing, or held-out data took the name back, the file holds the calibrated declared model.
     """
     condition, verdict = measurement.fit[0].name, diagnosis.verdict
     one_of = ""
@@ -48,9 +48,9 @@ def corrected_toml(measurement: Measurement, diagnosis: Diagnosis) -> str:
 
 
 def study_toml(measurement: Measurement, diagnosis: Diagnosis, material: str) -> str:
-    """The study that calibrates the corrected model in the file ``material``; "" where nothing is named.
+    """The study that calibrates the corrected model in the file ``material``; "" if no effect is named.
 
-    Empty too where fewer than three parameters and amplitudes can be varied, or no number of the first fitted condition
+    Also empty if fewer than three parameters and amplitudes can be varied, or no number of the first fitted condition
     can be a target.
     """
     verdict, scene, condition = diagnosis.verdict, corrected_scene(measurement, diagnosis), measurement.fit[0]
@@ -63,7 +63,7 @@ def study_toml(measurement: Measurement, diagnosis: Diagnosis, material: str) ->
         "format": 1,
         "title": f"{measurement.title or measurement.folder.name}, with {named}",
         "material": material,
-        # The amplitudes last: what the diagnosis added is always calibrated.
+        # The amplitudes are the last factors, so what the diagnosis added is always calibrated.
         "fallback": [factor["name"] for factor in factors[-CALIBRATED:]],
         "target": targets,
         "factor": factors,
@@ -96,9 +96,9 @@ def _factors(measurement: Measurement, diagnosis: Diagnosis, scene: Scene) -> li
 
 
 def _targets(condition: Condition, diagnosis: Diagnosis, scene: Scene) -> list[dict[str, Any]]:
-    """The angle of repose, or else the number that the declared model missed most, and that one beside the angle.
+    """The angle of repose, if possible, then the numbers that the declared model missed most; ``TARGETS`` at most.
 
-    A single replicate counts with the uncertainty that is stated for it.
+    A single replicate is taken with the uncertainty stated for it.
     """
     measured = replicates_of(condition)
     rows, names = measured.values, measured.summaries

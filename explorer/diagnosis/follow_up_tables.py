@@ -1,7 +1,7 @@
-"""The tables of a follow-up (`next_folder`) by quantity and pour, as a person fills them in, and back.
+"""The tables of a follow-up (`next_folder`) by quantity and pour, as a person fills them in: read and written.
 
-In the files a row that was not measured is a comment, since a reader refuses a row without a value; here it is a row
-like any other, its values empty. Lines of comments and observables that were not asked for stay as they are.
+In the files, a row that was not measured is a comment, because the reader refuses a row without a value. Here it is an
+ordinary row with empty values. Comment lines, and observables that were not asked for, stay as they are.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from solver import named, parse_quantity, read_toml
 from solver.assets import own_path
 
 KEPT = "follow_ups"
-"""Folder among the uploads for those that were sent back: they are no data sets of their own."""
+"""Folder among the uploads for follow-ups that were sent back: they are not data sets of their own."""
 ANY_DELIMITER = re.compile(f"[{''.join(DELIMITERS)}]")
 
 
 @dataclass(frozen=True)
 class AskedNumber:
-    """A quantity at the place ``x`` ("" for a scalar), and its value in every pour; "" where none is filled in."""
+    """A quantity at the place ``x`` ("" for a scalar), and its value in every pour; "" if none is filled in."""
 
     observable: str
     x: str
@@ -45,7 +45,7 @@ class AskedNumber:
 
 @dataclass(frozen=True)
 class AskedBody:
-    """A number of single bodies, its mean and standard error; "" where none is filled in."""
+    """A quantity of single bodies, its mean and standard error; "" if none is filled in."""
 
     body: str
     quantity: str
@@ -56,29 +56,29 @@ class AskedBody:
 
 @dataclass(frozen=True)
 class FollowUpTables:
-    """What the follow-up in ``folder`` asks for, and what is filled in. ``condition``: "" where nothing is poured."""
+    """What the follow-up in ``folder`` asks for, and what is filled in. ``condition``: "" if it asks for no pour."""
 
     folder: Path
     condition: str
     numbers: tuple[AskedNumber, ...]
     bodies: tuple[AskedBody, ...]
     scanned: frozenset[int]
-    """Pours of whose pile there is a scan."""
+    """Numbers of the pours whose pile has a scan."""
 
     @property
     def pours(self) -> int:
-        """How many are asked for."""
+        """Number of pours asked for."""
         return len(self.numbers[0].values) if self.numbers else 0
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """Every value that is asked for, pours first."""
+        """Every value asked for, those of pours first."""
         numbers = (value for row in self.numbers for value in row.values)
         return (*numbers, *(cell for row in self.bodies for cell in (row.mean, row.standard_error)))
 
 
 def read_follow_up(folder: Path) -> FollowUpTables:
-    """The tables in ``folder``. Raises CommandError or MeasurementError, in one line, where they are none."""
+    """The tables in ``folder``. Raises CommandError or MeasurementError, in one line, if it holds no such tables."""
     name, pours, bodies = _files(folder)
     weighed: list[AskedBody] = []
     if bodies is not None:
@@ -110,7 +110,8 @@ def _numbers(path: Path) -> Iterator[AskedNumber]:
 def write_numbers(folder: Path, numbers: Sequence[AskedNumber]) -> None:
     """Write the values of ``numbers``, in SI, in place of those in the table of ``folder``.
 
-    A value is a number in SI, or one with a unit, as 24.7mm. Raises CommandError for another, with nothing changed.
+    A value is a number in SI, or one with a unit, such as 24.7mm. Raises CommandError for anything else, and then
+    changes nothing.
     """
     _, path, _ = _files(folder)
     if path is None:
@@ -134,7 +135,7 @@ def write_numbers(folder: Path, numbers: Sequence[AskedNumber]) -> None:
 
 
 def write_bodies(folder: Path, bodies: Sequence[AskedBody]) -> None:
-    """The same of the table of single bodies: means and standard errors in the units that it names."""
+    """The same for the table of single bodies: means and standard errors in the units that the table names."""
     _, _, path = _files(folder)
     if path is None:
         raise CommandError(f"{folder / FILE}: bodies: is missing; allowed: the name of a table")
@@ -154,7 +155,7 @@ def write_bodies(folder: Path, bodies: Sequence[AskedBody]) -> None:
 
 
 def add_scan(folder: Path, name: str, content: bytes) -> Path:
-    """Keep ``content``, a scan that a browser sent as ``name``, as that of the first pile which has none yet."""
+    """Keep ``content``, a scan that a browser sent as ``name``, for the first pile that has no scan yet."""
     suffix = Path(name).suffix.lower()
     if suffix not in SUFFIXES:
         raise CommandError(f"{name[:80]}: allowed: files ending in {', '.join(SUFFIXES)}")
@@ -175,10 +176,10 @@ def packed(folder: Path) -> bytes:
 
 
 def take_filled(folder: Path, suggestion: Suggestion, name: str, content: bytes, uploads: Path) -> None:
-    """Take what was measured from the archive ``content``, this follow-up filled in elsewhere; kept in ``uploads`` too.
+    """Take the measured data from the archive ``content``, this follow-up filled in elsewhere; ``uploads`` keeps it.
 
-    Of its files these are taken: tables, scans, pictures, and the settings in measurement.toml. Raises CommandError in
-    one line, with nothing changed, for an archive of something else, or settings that name a file outside it.
+    Tables, scans, pictures, and the settings in measurement.toml are taken. Raises CommandError in one line, with
+    nothing changed, if the archive holds something else or its settings name a file outside it.
     """
     sent = unpacked_folder(name, content, uploads / KEPT, ORDER, read_follow_up)
     # The same archive may have been sent to another follow-up before.
@@ -200,7 +201,7 @@ def take_filled(folder: Path, suggestion: Suggestion, name: str, content: bytes,
 
 
 def _files(folder: Path) -> tuple[str, Path | None, Path | None]:
-    """Name and table of the one condition, and the table of single bodies; one of both may be missing."""
+    """Name and table of the one condition, and the table of single bodies; either table may be missing."""
     table = read_toml(folder / FILE)
     conditions, bodies = table.get("condition"), table.get("bodies")
     if conditions is None and bodies is not None:
@@ -213,7 +214,7 @@ def _files(folder: Path) -> tuple[str, Path | None, Path | None]:
 
 
 def _table(path: Path, columns: Sequence[str], is_row: Callable[[Sequence[str]], bool]) -> CellTable:
-    """The table in ``path``, the rows that were not measured among the others."""
+    """The table in ``path``, including the rows that were not measured."""
     lines = []
     for line in read_text(path, MOST_BYTES, MeasurementError).splitlines():
         bare = line.strip().strip('"').lstrip("# ") if line.lstrip(' "').startswith("#") else ""
@@ -235,13 +236,13 @@ def _is_body(cells: Sequence[str]) -> bool:
 
 
 def _entered(text: str, unit: str, where: str) -> str:
-    """A value as it was typed, in SI; "" for none. ParameterError where it is no number of that unit."""
+    """A typed value, converted to SI; "" for none. Raises ParameterError if it is not a number in that unit."""
     plain = "".join(text.split()).replace("−", "-")
     plain = plain if "." in plain else plain.replace(",", ".")
     return repr(parse_quantity(plain, unit, where)) if plain else ""
 
 
 def _write(path: Path, table: CellTable, columns: Sequence[str], line: Callable[[Sequence[str]], str]) -> None:
-    """Comments, header and rows in their order, each row as ``line`` says."""
+    """Write comments, header and rows in their order, each row as ``line`` formats it."""
     lines = [text for _, text in table.comments] + [",".join(columns)]
     write_whole(path, "\n".join([*lines, *(line(cells) for _, cells in table.rows[1:])]) + "\n")

@@ -28,11 +28,11 @@ from explorer.terminal.text_table import text_table
 from solver import EFFECTS, PHYSICS, executor
 
 TEACHINGS, SPLITS = (Teaching(4, 0), Teaching(4, 12), Teaching(8, 12)), 20
-"""What teaches the rule, and splits of the reference into pours that teach and data."""
+"""Which pours the rule is trained on, and the number of splits of the reference into training pours and data."""
 BANDS = ((3.5, 5.5), (5.5, 9.0))
-"""Strengths [σ] on the ruler of the effects in the data of a row."""
+"""Bands of strength [σ], on the ruler; a row's data hold effects of one band."""
 LISTED = 10
-"""Pairs that are shown for a kind of data."""
+"""Pairs shown for each kind of data."""
 SAID_EVERY = 100
 """Pours between two lines of progress."""
 
@@ -41,7 +41,7 @@ SAID_EVERY = 100
 class LimitOrder:
     """What a user asked for.
 
-    ``source``: folder of a measurement, or file of a made-up laboratory. ``reference``: file of earlier rounds.
+    ``source``: folder of a measurement, or file of a made-up laboratory. ``reference``: file with earlier rounds.
     """
 
     source: Path
@@ -53,7 +53,7 @@ class LimitOrder:
 
 
 def run_limit(order: LimitOrder, say: Callable[[str], None]) -> tuple[LimitStudy, tuple[CrossValidation, ...]]:
-    """Pour the rounds that are missing, and write what follows. Every pour and every round is kept."""
+    """Pour the missing rounds, and write what follows from them all. Every pour and every round is kept."""
     measurement = _declared(order.source)
     declared = declare(measurement, tuple(EFFECTS))
     sets = [feature_set(condition) for condition in measurement.fit]
@@ -71,7 +71,7 @@ def run_limit(order: LimitOrder, say: Callable[[str], None]) -> tuple[LimitStudy
 def cross_validations(
     found: Reference, study: LimitStudy, offered: Mapping[str, Sequence[int]]
 ) -> tuple[CrossValidation, ...]:
-    """What the rule of the diagnosis names, taught by few pours of every effect."""
+    """What the rule of the diagnosis names when it is trained on few pours of every effect."""
     kinds, pours = [one.kind for one in study.reached], found.sample.pours
     rows = []
     for data, numbers in offered.items():
@@ -93,7 +93,7 @@ def cross_validations(
 
 
 def truths_of(study: LimitStudy) -> list[PlantedTruth]:
-    """All that reference pours can be data of."""
+    """Every truth whose data can be taken from reference pours."""
     strong = [PlantedTruth(one.kind, "strong", one.ruler.value) for one in study.reached]
     return strong + [PlantedTruth(one.kind, "weak", one.weak.value) for one in study.reached if one.weak is not None]
 
@@ -105,7 +105,7 @@ def _declared(source: Path) -> Measurement:
 def _poured(
     order: LimitOrder, measurement: Measurement, declared: Declared, found: Reference, say: Callable[[str], None]
 ) -> Reference:
-    """``found`` with the rounds that are missing."""
+    """``found`` with the missing rounds added."""
     began, poured = time.monotonic(), 0
 
     def on_pour(what: str, left: int, _: Ended) -> None:

@@ -1,9 +1,9 @@
-"""What to measure next, as a folder that a laboratory fills in: ``OUT/next`` of a diagnosis, and back.
+"""What to measure next, as a folder that a laboratory fills in (``OUT/next`` of a diagnosis): written and read.
 
 measurement.toml, <name>.csv, scans/    a measured data set (`doe.measurement`) of one condition, without its values
-bodies.csv                              what to measure of single bodies, where that tells the answers apart; alone,
-                                        without a condition, where an answer is given and they can check it
-README.md, setup.svg                    what to set otherwise, in words and to scale
+bodies.csv                              what to measure on single bodies, if that tells the answers apart; alone,
+                                        without a condition, if there is an answer that single bodies can check
+README.md, setup.svg                    what to set differently, in words and to scale
 follow_up.json                          which answers the pours are to tell apart
 """
 
@@ -45,16 +45,16 @@ from solver.rigs.surface import Revolved, SurfacePose
 
 ORDER, SCHEMA, BODIES = "follow_up.json", 1, "bodies.csv"
 NEXT = "next"
-"""Name of the folder, in that of the diagnosis."""
+"""Name of the folder inside that of the diagnosis."""
 DROPPED = ("images", "mean_of", "material")
-"""Keys of a condition that are about pours that were made; its own material is that of the whole follow-up."""
+"""Keys dropped from a condition: they describe pours already made; its material becomes that of the whole follow-up."""
 PROTOCOLS = {
     "pour_through": "the outlet open from the start",
     "fill_then_open": "filled with the outlet closed, left to settle, then opened",
 }
 TURNED_FRAME = "x and y of what is read off the pile, and the axes of scans, stay those of the plate and turn with it"
 DRAWN, EDGE, LEFT = 420.0, 40.0, 200.0
-"""Height of the drawn rig, and what is free around it and to its left [px]."""
+"""Height of the drawn rig, and the free margins around it and to its left [px]."""
 INK, CHANGED = "#222222", "#c2410c"
 THIN, DASHED = 'stroke-width="1"', 'stroke-width="1" stroke-dasharray="6 4"'
 DIMENSIONS = {
@@ -64,12 +64,12 @@ DIMENSIONS = {
     "inlet_diameter": "top",
     "diameter": "top",
 }
-"""Dimensions of rigs that are drawn, and where: from the plate on, below the outlet, above the feed."""
+"""Dimensions of rigs that are drawn, and where: up from the plate, below the outlet, above the feed."""
 
 
 @dataclass(frozen=True, eq=False)
 class NextFolder:
-    """A follow-up that was measured: the labels that it is to tell apart, the name of the change, and its data."""
+    """A follow-up that was measured: the labels it is to tell apart, the name of the change, and its data."""
 
     rivals: tuple[str, ...]
     change: str
@@ -86,10 +86,10 @@ def write_next(
 ) -> None:
     """Write ``suggestion``, a change of a condition of ``measurement`` as read from ``source``, to the new ``folder``.
 
-    ``given``: the finished diagnosis that the command which takes it is to name as well. ``taken``: names of further
-    conditions, by earlier follow-ups.
+    ``given``: finished diagnosis that the command for the follow-up also has to name. ``taken``: names of further
+    conditions, from earlier follow-ups.
 
-    Raises CommandError in one line for a folder that is not empty, and for a change that no condition can state.
+    Raises CommandError in one line if the folder is not empty or no condition can state the change.
     """
     with appearing(folder, option="") as made:
         if suggestion.bodies:
@@ -120,8 +120,8 @@ def _write_pours(
     given: Path | None,
     taken: Sequence[str],
 ) -> str:
-    """Write the condition to be poured into ``made``, which will be ``folder``; returns its README."""
-    # It brings the solver's kernels along; whoever only writes a measurement's file needs none.
+    """Write the condition to be poured into ``made``, which will become ``folder``; returns its README."""
+    # This import loads the solver's kernels, which writing a measurement's file alone does not need.
     from doe.diagnose.candidate_experiments import as_suggested
 
     table = read_toml(source / FILE)
@@ -152,15 +152,15 @@ def asks_for(folder: Path, suggestion: Suggestion) -> bool:
     """Whether the follow-up in ``folder`` is ``suggestion``, for the same answers."""
     try:
         return _order(folder) == (tuple(suggestion.rivals), suggestion.experiment.name)
-    except CommandError:  # whatever it is, somebody has changed it
+    except CommandError:  # somebody has changed the file
         return False
 
 
 def read_next(folder: Path) -> NextFolder:
     """The follow-up in ``folder``, filled in.
 
-    Raises CommandError for what is not such a folder or holds no value yet, MeasurementError for data that cannot be
-    read; each one line naming file and key.
+    Raises CommandError if it is not such a folder or holds no value yet, MeasurementError if the data cannot be read;
+    each in one line naming file and key.
     """
     rivals, change = _order(folder)
     try:
@@ -181,7 +181,7 @@ def read_next(folder: Path) -> NextFolder:
 
 
 def _order(folder: Path) -> tuple[tuple[str, ...], str]:
-    """Rivals and change of the follow-up in ``folder``; raises CommandError for what is no such file."""
+    """Rivals and change of the follow-up in ``folder``; raises CommandError if its file is not valid."""
     path = folder / ORDER
     try:
         order = json.loads(read_text(path, MOST_BYTES, CommandError))
@@ -214,7 +214,7 @@ def _holds_value(table: Path) -> bool:
 
 
 def _free_name(suggestion: Suggestion, measurement: Measurement, others: Sequence[str]) -> str:
-    """The change as a file's name, and no condition's: a diagnosis takes the new data beside the old ones."""
+    """The change as a file name that no condition has: a diagnosis takes the new data beside the old."""
     slug = re.sub(r"[^a-z0-9]+", "_", suggestion.experiment.name.lower()).strip("_") or "follow_up"
     taken = {Path(BODIES).stem, *others, *(condition.name for condition in measurement.conditions)}
     return next(one for k in range(1, len(taken) + 2) if (one := slug if k == 1 else f"{slug}_{k}") not in taken)
@@ -243,7 +243,7 @@ def _changed_entry(
             insertion[key] = new
         else:
             raise CommandError(f"{path}: no condition states it; allowed: rig.…, insertion.drop_speed, {AS_THEY_ARE}")
-    if "mesh" in rig:  # a relative path would start in the working directory of whoever reads it
+    if "mesh" in rig:  # a relative path would be resolved in the reader's working directory
         rig["mesh"] = value(changed, "rig.mesh")
     if "region_z" in insertion:
         insertion["region_z"] = _moved(insertion["region_z"], pour_rig(changed).feed().floor)
@@ -251,12 +251,14 @@ def _changed_entry(
 
 
 def _moved(region: list[float], floor: float) -> list[float]:
-    """``region`` from the opening on, as it is where it begins there, else as high as before to the last bit if it can
-    be: another height would make other pours."""
+    """``region`` moved to begin at the opening, unless it begins there already.
+
+    Its height stays the same to the last bit if possible: another height would make other pours.
+    """
     if abs(region[0] - floor) <= FEED_SLACK:
         return region
     height = region[1] - region[0]
-    # The difference of two rounded heights: the next numbers on either side give the bits that these do not.
+    # The height is a difference of two rounded numbers: their neighbours may give the exact bits when they do not.
     near = [(low, high) for low in _neighbours(floor) for high in _neighbours(floor + height)]
     low, high = min(near, key=lambda ends: abs(ends[1] - ends[0] - height))
     return [low, high]
@@ -267,8 +269,10 @@ def _neighbours(x: float) -> tuple[float, float, float]:
 
 
 def _parameters(table: Settings, measurement: Measurement) -> dict[str, Any]:
-    """As stated, but for a range that another condition's rig has narrowed: read alone it would stay wide, and a
-    diagnosis takes no follow-up of other parameters."""
+    """As stated, except for a range that another condition's rig has narrowed.
+
+    Read without that condition, the range would stay wide, and a diagnosis refuses a follow-up with other parameters.
+    """
     stated = table.get("parameters", {})
     read, _ = read_parameters(
         checked(MeasurementFile, table).parameters, [condition.scene for condition in measurement.conditions]
@@ -281,7 +285,7 @@ def _parameters(table: Settings, measurement: Measurement) -> dict[str, Any]:
 
 
 def _uncertainty(table: Settings, condition: Condition) -> dict[str, Any]:
-    """As stated; that of a mean of n pours becomes that of one pour, √n times as much."""
+    """As stated; the uncertainty of a mean of n pours becomes that of one pour, √n times as large."""
     stated = table.get("uncertainty", {})
     if condition.mean_of == 1:
         return stated
@@ -293,7 +297,7 @@ def _uncertainty(table: Settings, condition: Condition) -> dict[str, Any]:
 
 
 def copied_material(name: str, source: Path, folder: Path) -> str:
-    """What the new file calls the material: its copy in ``folder``, or the name of a shipped one."""
+    """Name of the material in the new file: that of its copy in ``folder``, or of a shipped material."""
     own = source / own_path(name)
     if not own.is_file():
         return name
@@ -302,7 +306,7 @@ def copied_material(name: str, source: Path, folder: Path) -> str:
 
 
 def _copy_toml(path: Path, to: Path) -> None:
-    """Copy a material or body file with the files that it names; those outside its folder are named in full instead."""
+    """Copy a material or body file with the files it names; those outside its folder are named by full path instead."""
     text = path.read_text(encoding="utf-8")
     for name, is_body in _named_files(read_toml(path)):
         if Path(name).is_absolute() or not (path.parent / name).is_file():
@@ -345,13 +349,13 @@ def _toml(parts: Mapping[str, Mapping[str, Any]]) -> str:
         head + "".join(f"{toml_key(key)} = {toml_value(item)}\n" for key, item in table.items())
         for head, table in parts.items()
     )
-    return text.replace("\x7f", "\\u007F")  # JSON, whose strings these are, lets it stand; TOML does not
+    return text.replace("\x7f", "\\u007F")  # the strings are JSON, which allows this character; TOML does not
 
 
 def _empty_table(condition: Condition, pours: int) -> str:
-    """A row per pour, observable and place. Slopes that follow from a listed profile are not asked for.
+    """One row per pour, observable and place. Slopes that follow from a listed profile are not asked for.
 
-    A reader refuses a row without a value, so that each is a comment until it has one.
+    The reader refuses a row without a value, so each row is a comment until it has one.
     """
     asked = [one for one in condition.observations if one.origin != "profile"]
     units = ", ".join(f"{one.observable} [{one.unit}]" for one in asked)
@@ -369,7 +373,7 @@ def _empty_table(condition: Condition, pours: int) -> str:
 
 
 def _empty_bodies(asked: Sequence[tuple[str, str]]) -> str:
-    """A row per component and quantity, each a comment until it has its numbers."""
+    """One row per component and quantity, each a comment until it has its numbers."""
     lines = [
         '# Not measured yet. Of each row that you measured, take off the "# " in front and write mean and',
         "# standard error at its end. What was not measured stays as it is.",
@@ -473,7 +477,7 @@ scatter of lots or bodies, and what the instrument may be off), and take the `# 
 def _command(folder: Path, source: Path, given: Path | None) -> str:
     command = ["explorer", "diagnose", str(source.absolute()), "--follow-up", str(folder.absolute())]
     command += [] if given is None else ["--given", str(given.absolute())]
-    # The folder of the first diagnosis is not empty any more.
+    # The folder of the first diagnosis is no longer empty.
     command += ["--out", f"{folder.absolute().parent}_with_follow_up"]
     return f"""## The command that takes it
 
@@ -491,7 +495,7 @@ def _setting(scene: Scene, path: str, new: float | str) -> str:
     old, label = value(scene, path), parameter_label(path)
     if path == "insertion.protocol":
         return f"{label}: **{PROTOCOLS[str(new)]}** (so far {PROTOCOLS[str(old)]})"
-    # A laboratory sets this speed by the height that bodies fall from.
+    # A laboratory sets this speed by the height from which bodies fall.
     fall = f", as after a free fall of {_mm(float(new) ** 2 / (2.0 * 9.81))}" if path == "insertion.drop_speed" else ""
     return f"{label}: **{parameter_value(path, new)}**{fall} (so far {parameter_value(path, old)})"
 
@@ -506,7 +510,7 @@ def _mm(length: float) -> str:
 def setup_svg(scene: Scene, changed: Mapping[str, float | str]) -> str:
     """Cross-section of the rig of ``scene`` to scale, the parameters ``changed`` in another colour.
 
-    Empty for a rig without upright walls turned about its axis.
+    Empty for a rig without upright walls of revolution about its axis.
     """
     rig, fed, known = pour_rig(scene), scene.insertion, parameters(scene)
     shells: dict[bool, list[Revolved]] = {False: [], True: []}
@@ -527,7 +531,7 @@ def setup_svg(scene: Scene, changed: Mapping[str, float | str]) -> str:
         return f'<line x1="{x0:.1f}" y1="{y0:.1f}" x2="{x1:.1f}" y2="{y1:.1f}" stroke="{paint}" {more}/>'
 
     def text(r: float, z: float, down: float, words: str, path: str = "", anchor: str = "middle") -> str:
-        """At radius and height [m], and so many pixels further down."""
+        """Text at radius and height [m], moved ``down`` by that many pixels."""
         x, y = middle + r * scale, ground - z * scale + down
         return f'<text x="{x:.1f}" y="{y:.1f}" fill="{paint(path)}" text-anchor="{anchor}">{escape(words)}</text>'
 

@@ -20,9 +20,9 @@ from solver.assets import AssetNotFoundError, measurement_folder
 
 ANGLE = "angle_of_repose_deg"
 LEAST_HEIGHT = 3e-4
-"""Height [m] below which nothing of a measured surface is drawn."""
+"""Height [m] below which a measured surface is not drawn."""
 SECTORS = 72
-"""Of a surface of revolution."""
+"""Sectors of a surface of revolution."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class HeightSurface:
     vertices: npt.NDArray[np.float64]
     faces: npt.NDArray[np.int64]
     of_revolution: bool
-    """It was made of a mean profile, where no scan was measured."""
+    """Whether it was made from a mean profile, because no scan was measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,17 +43,17 @@ class AnswerPiles:
     before: Scene
     """The calibrated declared model."""
     after: Scene
-    """The final model; the same where nothing is added."""
+    """The final model; the same as ``before`` if no effect was added."""
     measured: HeightSurface | None
-    """None where the data hold neither scans nor profiles of this condition."""
+    """None if the data hold neither scans nor profiles of this condition."""
     angle: tuple[float, float]
-    """Mean and standard deviation of the measured angles of repose [°]; NaN where none were, or only one."""
+    """Mean and standard deviation of the measured angles of repose [°]; NaN if there are too few."""
     poured: tuple[tuple[float, float, int], tuple[float, float, int]]
-    """The same of the diagnosis's fresh pours of both models, and their number."""
+    """The same for the diagnosis's fresh pours of both models, and the number of pours."""
 
 
 def answer_piles(result: DiagnosisResult) -> AnswerPiles:
-    """The piles of the first fitted condition. Raises a ValueError where the data are not there any more."""
+    """The piles of the first fitted condition. Raises a ValueError if the data no longer exist."""
     try:
         measurement = with_given(load_measurement(measurement_folder(result.data.folder)), result.given)
     except AssetNotFoundError:
@@ -74,7 +74,7 @@ def answer_piles(result: DiagnosisResult) -> AnswerPiles:
 
 
 def measured_angle(condition: Condition) -> tuple[float, float]:
-    """Mean and standard deviation of the angles of repose that were measured in ``condition`` [°]; NaN without."""
+    """Mean and standard deviation of the angles of repose measured in ``condition`` [°]; NaN without angles."""
     found = condition.offered.get(ANGLE)
     known = np.empty(0) if found is None else np.asarray(found.values, dtype=float)
     known = known[np.isfinite(known)]
@@ -106,7 +106,7 @@ def model_scene(measurement: Measurement, condition: Condition, model: Calibrate
 
 
 def measured_surface(result: DiagnosisResult, condition: str) -> HeightSurface | None:
-    """The measured mean pile: of its scans, or of its mean profile turned about the axis."""
+    """The measured mean pile: from its scans, or from its mean profile turned about the axis."""
     for one in result.maps:
         if one.condition == condition:
             n = len(one.measured)
@@ -139,7 +139,7 @@ def surface_of_revolution(radius: npt.NDArray[np.float64], height: npt.NDArray[n
 
 
 def _covered(vertices: npt.NDArray[np.float64], n: int, m: int) -> npt.NDArray[np.int64]:
-    """Triangles (t, 3) between ``vertices`` of a grid of n rows and m columns, but for those of bare plate."""
+    """Triangles (t, 3) between ``vertices`` of a grid of n rows and m columns, except those of bare plate."""
     number = np.arange(n * m).reshape(n, m)
     corners = (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:])
     cells = np.stack([corner.ravel() for corner in corners], axis=1)

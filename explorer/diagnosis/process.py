@@ -21,16 +21,16 @@ from solver.assets import measurement_folder, shipped_measurements
 
 RESULT = DiagnosisResult.NAME
 OWN, FURTHER, FOLLOWED = "-own", "-further", "-followed"
-"""Behind the data's name in that of an output folder: of data that only share a shipped set's name, of a diagnosis
-that goes on from another one, and of one with a follow-up."""
+"""Suffixes of the data's name in the name of an output folder: for data that only share a shipped set's name, for a
+diagnosis that continues another one, and for one with a follow-up."""
 
 
 @dataclass(frozen=True)
 class Question:
     """What a diagnosis is asked. ``data``: folder of measured data, or a shipped name; ``effects``: the candidates, all
-    if empty; ``budget``: about so many pours for the emulator, None for as many as the program takes by itself;
-    ``given``: folder of a finished diagnosis whose effect is in the model, "" for none; ``follow_up``: that of a
-    follow-up which is filled in, "" for none.
+    if empty; ``budget``: approximate number of pours for the emulator, None for the program's own choice; ``given``:
+    folder of a finished diagnosis whose effect is in the model, "" for none; ``follow_up``: folder of a follow-up that
+    is filled in, "" for none.
     """
 
     data: str
@@ -41,33 +41,33 @@ class Question:
 
 
 class DiagnosisProcess(BackgroundOrders, Protocol):
-    """What the page needs of diagnoses that run somewhere."""
+    """What the page needs of diagnoses, wherever they run."""
 
     @property
     def store(self) -> Path | None:
-        """File of the store of runs, of the page's other pours too; None for the default store."""
+        """File of the store of runs, also used for the page's other pours; None for the default store."""
 
     def start(self, question: Question) -> None:
-        """Start a new diagnosis. Raises a ValueError where one runs already, or the question cannot be asked."""
+        """Start a new diagnosis. Raises a ValueError if one is running already or the question cannot be asked."""
 
     def queue(self, question: Question) -> None:
-        """Start it after those before it; at once if none runs and none waits."""
+        """Start it after those already queued; at once if none runs and none waits."""
 
     def resume(self, question: Question) -> None:
-        """Go on with the newest one of its data that was stopped. Raises a ValueError where there is none."""
+        """Continue the newest stopped diagnosis of these data. Raises a ValueError if there is none."""
 
     def stopped(self, question: Question) -> Path | None:
-        """The folder that :meth:`resume` goes on in, None where there is nothing to go on with."""
+        """The folder in which :meth:`resume` continues; None if there is nothing to continue."""
 
 
 class DiagnoseProcess(OrderedCommands[Question]):
     """``explorer diagnose`` as a child process.
 
     Args:
-        folder: output folders are made in here, one per start: ``<data>-<date>-<time>``.
+        folder: where output folders are made, one per start: ``<data>-<date>-<time>``.
         store: file of the store of runs; None for the default store.
         program: how the command line is called.
-        place: where diagnoses pour that are started or resumed from then on; None for this machine.
+        place: where diagnoses that are started or resumed from then on do their pours; None for this machine.
     """
 
     def __init__(
@@ -87,13 +87,13 @@ class DiagnoseProcess(OrderedCommands[Question]):
         self._begin(checked)
 
     def queue(self, question: Question) -> None:
-        """Start it when those before it have ended."""
+        """Start it when those queued before it have ended."""
         self._add(_checked(question))
 
     def resume(self, question: Question) -> None:
-        """Go on with the newest diagnosis of these data that was stopped, be it one of an earlier session of the page.
+        """Continue the newest diagnosis of these data that was stopped, even one of an earlier session of the page.
 
-        Effects and budget are those of ``question``; what has been poured for others stays in the store.
+        Effects and budget are those of ``question``; pours made for others stay in the store.
         """
         checked = _checked(question)
         self._process.refuse_while_running()
@@ -103,19 +103,19 @@ class DiagnoseProcess(OrderedCommands[Question]):
         self._go_on_in(out, self._arguments(checked, out))
 
     def stopped(self, question: Question) -> Path | None:
-        """Folder of the newest diagnosis of these data that was stopped before its end; None where none was."""
+        """Folder of the newest diagnosis of these data that was stopped before its end; None if there is none."""
         found = newest_unfinished(self._folder, (_stem(question.data),), RESULT)
         return None if found is None else found[0]
 
     def _begin(self, question: Question) -> None:
-        # One that goes on from another, or has a follow-up, is not resumed by its data's name; asked again, it finds
-        # its pours in the store.
+        # A diagnosis that continues another, or has a follow-up, is not resumed by its data's name; when it is started
+        # again, it finds its pours in the store.
         behind = FOLLOWED if question.follow_up else FURTHER if question.given else ""
         out = new_folder(self._folder, _stem(question.data) + behind)
         self._start(out, self._arguments(question, out))
 
     def _in_words(self, question: Question) -> str:
-        """Name of its data, and what is asked otherwise than by itself."""
+        """Name of its data, and what differs from the default question."""
         few = f", {len(question.effects)} effects" if question.effects else ""
         pours = "" if question.budget is None else f", about {question.budget} pours"
         given = f", going on from {Path(question.given).name}" if question.given else ""
@@ -134,14 +134,14 @@ class DiagnoseProcess(OrderedCommands[Question]):
 
 
 def _stem(data: str) -> str:
-    """Beginning of the output folders of these data: their name, and OWN behind that of a shipped set."""
+    """Beginning of the names of output folders of these data: their name, plus OWN if a shipped set has it too."""
     folder, name = Path(data).absolute(), Path(data).name
     own = name != data and name in shipped_measurements() and folder != measurement_folder(name).absolute()
     return name + (OWN if own else "")
 
 
 def _checked(question: Question) -> Question:
-    """The question with the folder of its data; raises a ValueError for what cannot be asked."""
+    """The question with the folder of its data; raises a ValueError if it cannot be asked."""
     if not question.data.strip():
         raise BackgroundError("choose measured data, or name their folder")
     for name in question.effects:
@@ -149,6 +149,6 @@ def _checked(question: Question) -> Question:
             raise BackgroundError(f"effects: {name!r} is not one of {', '.join(EFFECTS)}")
     folder = measurement_folder(question.data.strip()).absolute()
     if question.budget is not None:
-        # Refused here, before a process is started for it.
+        # Checked here, before a process is started for it.
         scaled_budget(question.budget, load_measurement(folder), question.effects or tuple(EFFECTS))
     return replace(question, data=str(folder))

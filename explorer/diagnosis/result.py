@@ -1,4 +1,4 @@
-"""What ``diagnosis.json`` holds: the answer, what it rests on, and the order that it came from."""
+"""What ``diagnosis.json`` holds: the answer, its basis, and the order that led to it."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Confirmation = Literal["no holdout", "within noise", "confirmed", "not certain",
 
 @dataclass(frozen=True)
 class Probabilities(Record):
-    """That nothing is missing, and that something outside the library is; those of effects stand in their rows."""
+    """That nothing is missing, and that something outside the library is; effects have theirs in their rows."""
 
     nothing: float
     outside: float
@@ -47,9 +47,9 @@ class Probabilities(Record):
 
 @dataclass(frozen=True)
 class Rule(Record):
-    """Constants of the rule that the report tells (`doe.diagnose`); ``doubted``: 1 in results from before it.
+    """Constants of the rule, for the report (`doe.diagnose`); ``doubted``: 1 in results older than this constant.
 
-    ``together``: whether ``contradicted`` is of fitted and held-out data together; of the latter alone before.
+    ``together``: whether ``contradicted`` is of fitted and held-out data together; in older ones, of the latter alone.
     """
 
     prior_nothing: float
@@ -67,20 +67,20 @@ class Rule(Record):
 
 @dataclass(frozen=True)
 class ErrorRow(HoldoutError):
-    """An error with the unit of its observable, σ for all together."""
+    """An error with the unit of its observable; σ for all observables together."""
 
     unit: str
 
 
 @dataclass(frozen=True)
 class Errors(Record):
-    """Errors by fresh pours on fitted and on held-out conditions, all observables together last; empty without such."""
+    """Errors by fresh pours on fitted and held-out conditions, all observables together last; empty if none."""
 
     fit: tuple[ErrorRow, ...]
     holdout: tuple[ErrorRow, ...]
 
     def told(self) -> tuple[tuple[ErrorRow, ...], str]:
-        """Return the rows that are told first, and the word for their data: held-out ones, fitted ones without such."""
+        """Return the rows to report first, and the word for their data: held-out if there are any, else fitted."""
         return (self.holdout, "held-out") if self.holdout else (self.fit, "fitted")
 
     def of(self, role: Role) -> tuple[ErrorRow, ...]:
@@ -90,7 +90,7 @@ class Errors(Record):
 
 @dataclass(frozen=True)
 class MeanAndDeviation(Record):
-    """Of several pours, number by number: mean and standard deviation, (k,)."""
+    """Mean and standard deviation over several pours, number by number, (k,)."""
 
     mean: FloatArray
     sd: FloatArray
@@ -98,7 +98,7 @@ class MeanAndDeviation(Record):
 
 @dataclass(frozen=True)
 class PouredCondition(Record):
-    """Fresh pours of a model in one condition: how many could be read, mean and deviation of their summaries."""
+    """Fresh pours of a model in one condition: how many could be read, and mean and deviation of their summaries."""
 
     condition: str
     pours: int
@@ -108,7 +108,7 @@ class PouredCondition(Record):
 
 @dataclass(frozen=True)
 class PouredModel(CalibratedModel):
-    """A calibrated model with its fresh pours. ``broken``: those that broke off or left nothing to be read."""
+    """A calibrated model with its fresh pours. ``broken``: how many broke off or left nothing to read."""
 
     broken: int = field(kw_only=True)
     conditions: tuple[PouredCondition, ...] = field(kw_only=True)
@@ -116,7 +116,7 @@ class PouredModel(CalibratedModel):
 
 @dataclass(frozen=True)
 class BeforeAndAfter(Record):
-    """The calibrated declared model and the final one; the same where nothing is added."""
+    """The calibrated declared model and the final one; the same if no effect was added."""
 
     before: PouredModel
     after: PouredModel
@@ -124,7 +124,7 @@ class BeforeAndAfter(Record):
 
 @dataclass(frozen=True)
 class MeasuredCondition(Record):
-    """A condition of the data. ``replicates``: measured pours; ``mean_of``: how many of them one row is the mean of."""
+    """A condition of the data. ``replicates``: measured pours; ``mean_of``: how many of them each row averages."""
 
     condition: str
     role: Role
@@ -135,7 +135,7 @@ class MeasuredCondition(Record):
 
     @property
     def alone(self) -> bool:
-        """Whether its scatter cannot be told from the data: a single pour, or a single mean of several."""
+        """Whether the data do not show its scatter: a single pour, or a single mean of several."""
         return self.replicates == self.mean_of
 
 
@@ -153,7 +153,7 @@ class PileProfiles(Record):
 
 @dataclass(frozen=True)
 class DataRead(Record):
-    """The folder that was read, what in it is not used, and what was changed in reading."""
+    """The folder that was read, what in it is not used, and what was changed while reading."""
 
     folder: str
     title: str
@@ -163,7 +163,7 @@ class DataRead(Record):
 
 @dataclass(frozen=True)
 class DiagnosisOrder(Record):
-    """What was asked for; no effects: all of them. ``given``: folder of the diagnosis that this one goes on from."""
+    """What was asked for; no effects means all of them. ``given``: folder of the diagnosis that this one continues."""
 
     out: str
     effects: tuple[str, ...]
@@ -176,7 +176,7 @@ class DiagnosisOrder(Record):
 
 @dataclass(frozen=True)
 class PourCounts(Record):
-    """Pours that were run, not found in the store, and settings that were poured."""
+    """Number of pours that were run (not found in the store), and of settings that were poured."""
 
     run: int
     settings: int
@@ -184,7 +184,7 @@ class PourCounts(Record):
 
 @dataclass(frozen=True)
 class Duration(Record):
-    """Seconds in all."""
+    """Total time [s]."""
 
     total_s: float
 
@@ -196,22 +196,22 @@ class DiagnosisResult(Document):
     Attributes
     ----------
     verdict, statement, names, taken_back, final
-        The answer (`doe.diagnose.verdict`): its kind with what is in it, a sentence, the effects or pairs in it, the
-        one that held-out data took back, the label of the final model.
+        The answer (`doe.diagnose.verdict`): its kind with the names in it, a sentence, the effects or pairs in it, the
+        one that held-out data took back, and the label of the final model.
     probabilities, threshold, rule, temperature
-        How sure it is, and the numbers of the rule.
+        How certain it is, and the numbers of the rule.
     effects, levels, ranges, similar
-        What the data say of every effect, where each was poured, the ranges considered, and which look alike.
+        What the data say about every effect, where each was poured, the ranges considered, and which look alike.
     parameters, residuals, where, scatter, left_out, offered
-        The fit to the data, and what of them it rests on.
+        The fit to the data, and which of the data it uses.
     error, held_out, confirmation
-        Errors by fresh pours, what held-out data say of the final model, and both models.
+        Errors by fresh pours, what held-out data say about the final model, and both models.
     next_experiment
-        The menu of follow-ups, the most telling first.
+        The possible follow-ups, the most informative first.
     measured, piles, maps, data, units
-        The measured conditions; ``units``: of every summary.
+        The measured conditions; ``units``: unit of every summary.
     order, pours, timing, versions
-        What was asked, what it took, and by which programs.
+        What was asked, how much it took, and the programs' versions.
     """
 
     SCHEMA: ClassVar[int] = 3
@@ -251,10 +251,10 @@ class DiagnosisResult(Document):
     versions: dict[str, str | None]
     about: About = field(default_factory=About)
     given: dict[str, tuple[float, ...]] = field(default_factory=dict)
-    """Effects that the declared model holds by an earlier answer, with the amplitudes [natural units] about which they
+    """Effects that the declared model has from an earlier answer, with the amplitudes [natural units] about which they
     were calibrated here (`doe.declared.given`)."""
     bodies: tuple[BodyRow, ...] = ()
-    """What was measured of single bodies, beside both models."""
+    """What was measured on single bodies, beside both models."""
 
     @property
     def kind(self) -> Kind:
@@ -264,12 +264,12 @@ class DiagnosisResult(Document):
 
     @property
     def named(self) -> tuple[str, ...]:
-        """The effects, or the pair "a+b", that the answer names; empty where it names none."""
+        """The effects, or the pair "a+b", that the answer names; empty if it names none."""
         return self.names if self.kind in ("effect", "effects") else ()
 
     @property
     def added(self) -> bool:
-        """Whether the final model holds an effect: before and after are the same model otherwise."""
+        """Whether the final model has an effect; otherwise before and after are the same model."""
         return self.final != BASE
 
     def ranked(self) -> list[tuple[str, float]]:
@@ -279,7 +279,7 @@ class DiagnosisResult(Document):
         return sorted(found.items(), key=lambda one: -one[1])
 
     def probability(self, answer: str) -> float:
-        """Return that of one answer; 0 of an effect that is so improbable that it has no row."""
+        """Return the probability of one answer; 0 for an effect so improbable that it has no row."""
         return dict(self.ranked()).get(answer, 0.0)
 
     def missing(self, label: str) -> float:
@@ -288,14 +288,14 @@ class DiagnosisResult(Document):
         return row.missing if row is not None else 0.0
 
     def effect_row(self, label: str) -> EffectRow | None:
-        """Return the row of an effect or a pair; None where it has none."""
+        """Return the row of an effect or a pair; None if it has none."""
         return next((row for row in self.effects if row.name == label), None)
 
     def handed_on(self) -> dict[str, tuple[float, ...]]:
-        """Return what a further diagnosis has in its model, effect → amplitudes [natural units].
+        """Return the effects that a further diagnosis has in its model, effect → amplitudes [natural units].
 
-        What was given here, as it was calibrated, and the most probable effect, also one of an answer that does not
-        fit; empty where it is not as probable as a name has to be.
+        These are the effects given here, as calibrated, and the most probable effect, even if the answer does not fit;
+        empty if that effect is less probable than the threshold for a name.
         """
         best, _ = self.ranked()[0]
         row = self.effect_row(best)
@@ -312,11 +312,11 @@ class DiagnosisResult(Document):
         return next(one for one in self.ranges if one.name == effect)
 
     def overall(self, role: Role) -> ErrorRow | None:
-        """Return the error of all observables together; None where the role has no condition."""
+        """Return the error of all observables together; None if the role has no condition."""
         return next((row for row in self.error.of(role) if row.observable == OVERALL), None)
 
     def confirmed(self) -> Confirmation:
-        """Return what the held-out conditions say of the final model, by its skill (`doe.holdout`)."""
+        """Return what the held-out conditions say about the final model, by its skill (`doe.holdout`)."""
         row = self.overall("holdout")
         if row is None:
             return "no holdout"

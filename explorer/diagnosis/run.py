@@ -1,4 +1,4 @@
-"""A diagnosis from its order to its files: the data are read, the loop is run, and its answer written."""
+"""A diagnosis from its order to its files: read the data, run the loop, and write the answer."""
 
 from __future__ import annotations
 
@@ -95,16 +95,16 @@ class DiagnoseOrder:
     record: Path | None = None
     """New file for the answer as a recording."""
     plan_next: bool = True
-    """Whether what could be measured next is looked for."""
+    """Whether to look for what could be measured next."""
     scheduler: str = ""
     """Address of a Dask scheduler whose workers pour; "" for processes of this machine."""
 
 
 @dataclass(frozen=True)
 class Earlier:
-    """An earlier answer that a diagnosis goes on from.
+    """An earlier answer that a diagnosis continues.
 
-    given: effects with their amplitudes. follow_ups: what was measured for the answers before.
+    given: effects with their amplitudes. follow_ups: what was measured for the earlier answers.
     """
 
     given: Given
@@ -115,7 +115,7 @@ class Earlier:
     ) -> tuple[Measurement, Measurement | None]:
         """``measurement`` with the earlier follow-ups among its fitted conditions, and the effects in its model.
 
-        A new ``follow_up`` has them in its model too, within the same ranges: those that the rigs of both allow.
+        A new ``follow_up`` also has the effects in its model, within the same ranges: those that both rigs allow.
         """
         for one in self.follow_ups:
             measurement = joined(measurement, one)
@@ -134,8 +134,8 @@ NOTHING_BEFORE = Earlier({})
 def run_diagnose(order: DiagnoseOrder, reporter: Reporter) -> DiagnosisResult:
     """Run the loop and write the files; returns the content of ``diagnosis.json``.
 
-    Finished pours are kept in the store, so an interrupted one goes on. With ``record`` the answer that stands in the
-    folder already, if there is one, is only recorded.
+    Finished pours are kept in the store, so an interrupted diagnosis can be continued. With ``record``, an answer that
+    is already in the folder is only recorded.
     """
     if order.record is not None:
         check_new_file(order.record, suffix=".rrd")
@@ -157,7 +157,7 @@ def run_diagnose(order: DiagnoseOrder, reporter: Reporter) -> DiagnosisResult:
         earlier = earlier_answer(order.given, order.folder)
     if set(order.effects or EFFECTS) <= set(earlier.given):
         raise CommandError("--effects: all of them are already in the model by --given; allowed: at least one other")
-    # The executor before anything is in the folder: perhaps no scheduler answers.
+    # Start the executor before writing to the folder: perhaps no scheduler answers.
     with kept_for_one(order.out), executor(order.threads, order.scheduler) as pool:
         reporter.begin(order.out, order.resume)
         return _run(order, measurement, asked.measurement if asked else None, earlier, pool, reporter)
@@ -171,7 +171,7 @@ def _run(
     pool: Executor,
     reporter: Reporter,
 ) -> DiagnosisResult:
-    """Pour, judge and write into ``order.out``, which is there and this command's alone."""
+    """Pour, judge and write into ``order.out``, which exists and is reserved for this command."""
     say, names = reporter.say, order.effects or tuple(EFFECTS)
     path, as_declared = order.store or default_store(), measurement
     measurement, follow_up = earlier.carried_into(measurement, follow_up)
@@ -218,7 +218,7 @@ def _run(
         )
     if found.suggestions:
         following = order.out / NEXT
-        if (following / ORDER).is_file():  # of a run that was stopped later, or one that is gone on with
+        if (following / ORDER).is_file():  # from a run that was stopped after writing it, or one that is continued
             same = "" if asks_for(following, found.suggestions[0]) else "; it is not what this answer asks for"
             say(f"{following}: exists already and is not changed, as it may be filled in{same}")
         else:
@@ -242,7 +242,7 @@ def _run(
 
 
 def _finished(order: DiagnoseOrder) -> DiagnosisResult | None:
-    """The answer in the folder; None where there is none. CommandError where it is that of another question."""
+    """The answer in the folder; None if there is none. Raises CommandError if it answers another question."""
     result = read_result(DiagnosisResult, order.out, DiagnosisResult.NAME)
     if result is None:
         return None
@@ -265,7 +265,7 @@ def _finished(order: DiagnoseOrder) -> DiagnosisResult | None:
 def earlier_answer(folder: Path, data: Path) -> Earlier:
     """What the finished diagnosis in ``folder`` hands on to one of ``data``, with the follow-ups of those before it.
 
-    Raises CommandError, in one line, where there is none, no effect in it is as probable as a name has to be, or its
+    Raises CommandError, in one line, if there is none, no effect in it reaches the threshold for a name, or its
     follow-up belongs to other data.
     """
     result = _earlier_result(folder)
@@ -299,12 +299,12 @@ def _earlier_result(folder: Path) -> DiagnosisResult:
 
 
 def _absolute(path: Path | str | None) -> str | None:
-    """As it stays true in another working directory; None for none."""
+    """``path`` as an absolute path, valid in any working directory; None for none."""
     return str(Path(path).absolute()) if path else None
 
 
 def _recorded(path: Path, result: DiagnosisResult, say: Callable[[str], None]) -> None:
-    # rerun takes a second to import; only those who record pay for it.
+    # rerun takes a second to import, so it is imported only for recording.
     from explorer.recordings.answer_recording import record_diagnosis
 
     record_diagnosis(path, result, say)
@@ -383,7 +383,7 @@ def result_of(
 
 
 def error_lines(result: DiagnosisResult) -> list[str]:
-    """The table *before | after | noise floor* on held-out data, or on fitted data where there are none."""
+    """The table *before | after | noise floor* on held-out data, or on fitted data if none are held out."""
     rows, role = result.error.told()
     lines = [f"error on {role} data", f"{'observable':26} {'before':>10} {'after':>10} {'noise floor':>12}"]
     for row in rows:
@@ -398,7 +398,7 @@ def _errors(rows: Sequence[HoldoutError], units: dict[str, str]) -> tuple[ErrorR
 
 
 def _piles(found: Diagnosis, number: int) -> Iterator[PileProfiles]:
-    """Height profiles [m] of condition ``number``, measured and by both models; none where the data have none."""
+    """Height profiles [m] of condition ``number``, measured and by both models; none if the data have none."""
     condition = found.conditions[number]
     profile = measured_profile(condition)
     blocks = [profile.values, *(one.profiles[number] for one in (found.before, found.after))] if profile else []

@@ -1,7 +1,8 @@
 """The angle of repose of a pour that still moves: when to read it, what was read last, and the process that reads it.
 
-A reading takes some 25 ms, for which the pour would stand still: while it runs, another process reads (piles in, angles
-out, until the line is cut). What stands still is read here, so that its angle is that of what is seen.
+A reading takes about 25 ms, during which the pour would stand still. While the pour runs, another process therefore
+does the reading (piles in, angles out, until the connection closes). A pour that stands still is read here, so that
+the angle is that of the pile on the screen.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ from solver.observables.repose import Outline
 from solver.pours.record import Pile
 
 LEAST_SHARE_BELOW = 0.25
-"""Share of the poured mass that has to lie below the outlet: the first few bodies are no pile that has an angle."""
+"""Share of the poured mass that has to lie below the outlet: the first few bodies do not form a pile with an angle."""
 SIMULATED_INTERVAL, WALL_INTERVAL = 0.1, 0.5
-"""The angle is read anew after this long of simulated or of wall time [s], whichever comes first."""
+"""The angle is read again after this much simulated or wall time [s], whichever comes first."""
 WALL_SHARE = 0.15
 """Largest share of the wall time that reading may take; a big pile is read less often."""
 ANGLES: Mapping[str, Callable[[PileReading], Value]] = {
@@ -39,11 +40,11 @@ class PileAngles:
     observables: Mapping[str, Value] = field(default_factory=dict)
     """The angles by name; empty before there was a pile."""
     outline: Outline | None = None
-    """The view that the left and the right angle were read from, with the lines of its flanks."""
+    """The view from which the left and right angles were read, with the lines of its flanks."""
 
 
 def read_angles(pile: Pile) -> PileAngles:
-    """What ``pile`` is read as."""
+    """The angles read off ``pile``."""
     reading = PileReading(pile)
     return PileAngles(
         {name: angle(reading) for name, angle in ANGLES.items()}, reading.front if reading.is_pile else None
@@ -51,10 +52,10 @@ def read_angles(pile: Pile) -> PileAngles:
 
 
 class AngleReader:
-    """Reads the angles of one pour after the other. Times are in seconds.
+    """Reads the angles of one pour after another. Times are in seconds.
 
-    line: to a process that reads while this one goes on; without it everything is read here.
-    clock: the present moment of wall time.
+    line: connection to a process that reads while this one continues; without it, everything is read here.
+    clock: present wall time.
     """
 
     def __init__(self, line: Connection | None, clock: Callable[[], float]) -> None:
@@ -63,7 +64,7 @@ class AngleReader:
         self.forget()
 
     def forget(self, angles: PileAngles | None = None) -> None:
-        """Begin anew: another pour, or an earlier moment of this one, of which ``angles`` had been read."""
+        """Start over, for another pour or an earlier moment of this one, at which ``angles`` had been read."""
         self.newest = angles or PileAngles()
         self._forgotten = self._unheard
         self._read_at = self._wall_due = self._wall_earliest = -math.inf
@@ -75,7 +76,7 @@ class AngleReader:
         return time > self._read_at and moved_on and wall >= self._wall_earliest and self._unheard == self._forgotten
 
     def read(self, pile: Pile, share_below: float, time: float) -> None:
-        """Read ``pile``, if ``share_below`` (0 … 1, mass below the outlet per poured mass) makes it one."""
+        """Read ``pile``, if ``share_below`` (0 … 1, mass below the outlet per poured mass) is enough for a pile."""
         self._forgotten = self._unheard
         self._begin(time)
         if share_below >= LEAST_SHARE_BELOW:
@@ -83,11 +84,11 @@ class AngleReader:
         self._end()
 
     def ask(self, pile: Pile, share_below: float, time: float) -> None:
-        """Have ``pile`` read at the other end of the line; :meth:`hear` takes the answer."""
+        """Have the other process read ``pile``; :meth:`hear` takes the answer."""
         if self._line is None or share_below < LEAST_SHARE_BELOW:
             self.read(pile, share_below, time)
             return
-        if self._unheard:  # still at a pile that is forgotten; this one will be due again
+        if self._unheard:  # the other process still reads a forgotten pile; this one will be due again
             return
         self._begin(time)
         try:
@@ -97,7 +98,7 @@ class AngleReader:
             self._hang_up()
 
     def hear(self) -> bool:
-        """Take what the other process has read, if it has; True where that is news."""
+        """Take what the other process has read, if anything; True if that is new."""
         if self._line is None or not self._unheard:
             return False
         try:
@@ -124,12 +125,12 @@ class AngleReader:
         self._wall_earliest = now + (now - self._began) / WALL_SHARE
 
     def _hang_up(self) -> None:
-        """The other process has ended: everything is read here from now on."""
+        """The other process has ended: read everything here from now on."""
         self._line, self._unheard, self._forgotten, self._read_at = None, 0, 0, -math.inf
 
 
 def run(line: Connection) -> None:
-    """Main function of the process. It ends with the solver's process, whose end of the line closes with it."""
+    """Main function of the reading process. It ends with the solver's process, which closes the connection."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     give_way(LIVE)
     try:

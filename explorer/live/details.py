@@ -1,4 +1,4 @@
-"""What frames do not carry: velocities, loads and contacts. Read about ten times a second, while somebody looks."""
+"""What frames do not carry: velocities, loads and contacts. Read about ten times a second, while they are shown."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int32]
 
 MAX_CONTACTS = 4096
-"""Contacts for which there is room: those of the body that is looked at, then the strongest."""
+"""Maximum number of contacts: those of the inspected body, then the strongest."""
 
 SLOT = np.dtype(
     [
@@ -39,12 +39,12 @@ SLOT = np.dtype(
     ],
     align=True,
 )
-"""One moment in memory; the first ``bodies`` rows, and the first ``contacts`` contacts, are filled."""
+"""One moment in memory; only the first ``bodies`` rows and the first ``contacts`` contacts are filled."""
 
 
 @dataclass(frozen=True)
 class Details:
-    """The n bodies that have entered, in order of entry, and up to ``MAX_CONTACTS`` of their contacts (m)."""
+    """The n bodies that have entered, in order of entry, and m ≤ ``MAX_CONTACTS`` of their contacts."""
 
     number: int
     generation: int
@@ -58,7 +58,7 @@ class Details:
     load: Floats
     """Σ |F_n| over the contacts of a body [N], shape (n,)."""
     neighbours: Ints
-    """Coordination number: other bodies that a body touches, shape (n,)."""
+    """Coordination number: how many other bodies a body touches, shape (n,)."""
     entered: Floats
     """When the bodies entered [s], shape (n,)."""
     touching: int
@@ -68,17 +68,17 @@ class Details:
     body: Ints
     """One body of each contact, shape (m,)."""
     partner: Ints
-    """The other one, or -1 - index of a surface of the rig, shape (m,)."""
+    """The other body, or -1 - index of a surface of the rig, shape (m,)."""
     point: Floats
     """[m], shape (m, 3)."""
     normal_force: Floats
-    """[N], positive where the two press, shape (m,)."""
+    """[N], positive where the two press on each other, shape (m,)."""
     tangential_force: Floats
     """[N], shape (m,)."""
 
 
 def shared_details(context: Any) -> Any:
-    """Shared memory for details, to be handed to a process that ``context`` (multiprocessing) starts."""
+    """Shared memory for details, for a process that ``context`` (multiprocessing) starts."""
     return shared_slots(context, SLOT)
 
 
@@ -102,7 +102,7 @@ class DetailWriter:
         contacts: Contacts,
         looked_at: int | None,
     ) -> None:
-        """Write a moment: ``entered`` [s] are the bodies' times of entry, ``looked_at`` the one inspected, if any."""
+        """Write a moment: ``entered`` [s] are the bodies' times of entry, ``looked_at`` the inspected body, if any."""
         n, size = len(bodies.mass), np.abs(contacts.normal_force)
         chosen = most_wanted(contacts, looked_at)
         m = len(chosen)

@@ -1,8 +1,8 @@
 """Frames in shared memory: the solver's process writes the newest state of all bodies, the page's process reads it.
 
-A block has two slots and a counter. The writer fills the slot that was not published last and then raises the counter;
-a reader copies the published slot and looks at the counter again: while it has not moved, the writer was at work on
-the other slot, so the copy is whole. No lock is involved that a dying process could keep. Details of the contacts
+A block has two slots and a counter. The writer fills the slot that was not published last, then increments the counter.
+A reader copies the published slot and then checks the counter again: if it has not changed, the writer was at work on
+the other slot, so the copy is complete. There is no lock that a dying process could keep. Details of the contacts
 travel in a block of the same kind (``explorer/live/details.py``).
 """
 
@@ -21,11 +21,11 @@ from solver.pours.record import Bodies
 T = TypeVar("T")
 
 READ_ATTEMPTS = 5
-"""Copies of a slot that are tried before the last whole one is given again."""
+"""Attempts to copy a slot before the last complete copy is returned again."""
 MAX_BODIES = 32768
-"""Bodies for which there is room in a frame."""
+"""Maximum number of bodies in a frame."""
 MAX_SURFACES = 64
-"""Surfaces of a rig for which there is room in a frame."""
+"""Maximum number of surfaces of a rig in a frame."""
 NO_SURFACES: npt.NDArray[np.float64] = np.zeros((0, 7))
 SLOT = np.dtype(
     [
@@ -42,7 +42,7 @@ SLOT = np.dtype(
     ],
     align=True,
 )
-"""One frame in memory; the first ``bodies`` rows of the arrays, and the first ``surfaces`` poses, are filled."""
+"""One frame in memory; only the first ``bodies`` rows of the arrays and the first ``surfaces`` poses are filled."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class FrameWriter:
     def publish(
         self, bodies: Bodies, generation: int, time: float, surfaces: npt.NDArray[np.float64] = NO_SURFACES
     ) -> None:
-        """Write a frame; there must not be more than ``MAX_BODIES`` bodies and ``MAX_SURFACES`` poses (k, 7)."""
+        """Write a frame of at most ``MAX_BODIES`` bodies and ``MAX_SURFACES`` poses (k, 7)."""
         n = len(bodies.mass)
 
         def fill(slot: Any) -> None:
@@ -101,12 +101,12 @@ class FrameReader:
         self._reader = SlotReader(block, SLOT, _copy, between)
 
     def newest(self) -> Frame | None:
-        """The newest frame, or None before the first one; the same object as long as nothing new was published."""
+        """The newest frame, or None before the first one; the same object until a new one is published."""
         return self._reader.newest()
 
 
 def shared_block(context: Any) -> Any:
-    """Shared memory for frames, to be handed to a process that ``context`` (multiprocessing) starts."""
+    """Shared memory for frames, for a process that ``context`` (multiprocessing) starts."""
     return shared_slots(context, SLOT)
 
 
@@ -139,9 +139,9 @@ class SlotWriter:
 
 
 class SlotReader(Generic[T]):
-    """The reader's end of a block. ``copy`` makes what is read from a slot and its number, from 1.
+    """The reader's end of a block. ``copy`` makes the result from a slot and its number, which counts from 1.
 
-    ``between`` is called after each copy, before it is checked (tests put a writer there).
+    ``between`` is called after each copy, before the check (tests put a writer there).
     """
 
     def __init__(
@@ -158,7 +158,7 @@ class SlotReader(Generic[T]):
     def newest(self) -> T | None:
         """The newest, or None before the first one.
 
-        The same object as long as nothing new was published, and also where the writer overtook every attempt
+        It is the same object until something new is published, and also if the writer overtook every attempt
         to copy (it would have to publish twice within a copy of some 10 µs, five times in a row).
         """
         for _ in range(READ_ATTEMPTS):

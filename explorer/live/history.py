@@ -1,8 +1,8 @@
-"""Moments of a pour to which the person at the screen can go back: all recent ones, fewer of the older ones.
+"""Moments of a pour to which the user can go back: all recent ones, fewer of the older ones.
 
-Bounded by memory. When there is no more room, that moment goes whose neighbours leave the smallest gap for its age, so
-the gaps grow in proportion to how long ago they are. A moment that is gone is not lost: the pour repeats the same bits
-from the one before it, as long as no parameter was changed in between.
+Memory is bounded. When it is full, the moment is deleted whose neighbours leave the smallest gap relative to its age,
+so the gaps grow in proportion to their age. A deleted moment is not lost: the pour repeats the same bits from the
+moment before it, as long as no parameter was changed in between.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from solver.scenes.scene import Scene
 ROOM = 128 * 2**20
 """Memory [B] for all moments; one takes 72 kB with 29 bodies of 30 spheres, 1.8 MB with 2000 spheres in a bed."""
 MOST = 500
-"""Moments at most, however small."""
+"""Maximum number of moments, however small."""
 LEAST = 3
-"""Moments that are kept, however large."""
+"""Minimum number of moments kept, however large."""
 HAIR = 1e-9
-"""Simulated time [s] that rounding may add to or take from a sum of steps."""
+"""Tolerance [s] for rounding in a sum of time steps."""
 
 
 @dataclass(frozen=True)
@@ -30,11 +30,11 @@ class Moment:
 
     kept: Kept
     scene: Scene
-    """As the person sees it, with the parameters in force."""
+    """The scene as the user sees it, with the parameters in force."""
     angles: PileAngles
-    """What was read last."""
+    """The angles read last."""
     retuned: bool
-    """Parameters had been changed since the pour began."""
+    """Whether parameters had been changed since the pour began."""
 
     @property
     def time(self) -> float:
@@ -56,7 +56,7 @@ class History:
         return self._moments[0].time if self._moments else math.nan
 
     def since(self, time: float) -> float:
-        """How long before ``time`` [s] the last moment was; infinite while there is none."""
+        """Time [s] from the last moment to ``time``; infinite while there is none."""
         return time - self._moments[-1].time + HAIR if self._moments else math.inf
 
     @property
@@ -65,7 +65,7 @@ class History:
         return [moment.time for moment in self._moments]
 
     def add(self, moment: Moment) -> None:
-        """Keep ``moment``, which is not earlier than the last one; it replaces one of the same time."""
+        """Keep ``moment``, which must not be earlier than the last one; it replaces one of the same time."""
         if self._moments and self._moments[-1].time >= moment.time - HAIR:
             self._moments.pop()
         self._moments.append(moment)
@@ -73,14 +73,14 @@ class History:
             del self._moments[thinnest(self.times)]
 
     def changed(self, time: float) -> None:
-        """Note that a parameter was changed at ``time`` [s]: what comes after does not follow from what was before."""
+        """Note that a parameter was changed at ``time`` [s]: later states do not follow from earlier ones alone."""
         self._changes.append(time)
 
     def back_to(self, time: float, now: float) -> tuple[Moment, float] | None:
-        """The last moment at or before ``time`` [s], or else the first one, and until when it can be repeated from.
+        """The last moment at or before ``time`` [s], or else the first one, and the time until which to repeat from it.
 
-        That is ``time``, or the next change of a parameter after the moment. What is later than the moment is
-        forgotten. None if nothing is kept from before ``now``.
+        That time is ``time``, or that of the next change of a parameter after the moment. Everything later than the
+        moment is forgotten. None if nothing is kept from before ``now``.
         """
         before = [moment for moment in self._moments if moment.time <= time + HAIR]
         before = before or [moment for moment in self._moments[:1] if moment.time < now - HAIR]
@@ -97,6 +97,6 @@ class History:
 
 
 def thinnest(times: list[float]) -> int:
-    """Which of ``times`` [s], neither the first nor the last, leaves the smallest gap for its age."""
+    """Index of the one of ``times`` [s], neither first nor last, that leaves the smallest gap relative to its age."""
     now = times[-1]
     return min(range(1, len(times) - 1), key=lambda k: (times[k + 1] - times[k - 1]) / (now - times[k]))

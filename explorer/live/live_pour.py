@@ -1,7 +1,7 @@
-"""One pour that obeys commands and shows itself: the part of the solver's process that owns Taichi's objects.
+"""One pour that obeys commands and publishes its state: the part of the solver's process that owns Taichi's objects.
 
-The pour is alone in its batch, and begun with everything compiled that it will need. Frames go to shared memory, and
-details of its contacts while somebody looks at them.
+The pour is alone in its batch, and everything that it will need is compiled when it begins. Frames go to shared memory,
+as do details of its contacts while they are shown.
 """
 
 from __future__ import annotations
@@ -54,22 +54,22 @@ from solver.scenes.time_step import stability_limit
 FRAME_INTERVAL = 1.0 / 60.0
 """Wall time [s] between published frames."""
 DETAIL_INTERVAL = 0.1
-"""Wall time [s] between details, while they are looked at."""
+"""Wall time [s] between details, while they are shown."""
 KEPT_EVERY = 0.02
-"""Simulated time [s] between two moments that can be come back to at once; those between are run again."""
+"""Simulated time [s] between two moments to which the pour can return at once; those between are simulated again."""
 STATUS_INTERVAL = 0.1
 """Wall time [s] between reports."""
 BEFORE_FIRST_SAMPLE = {"entered": 0.0, "discharged": 0.0, "kinetic": 0.0, "touching": 0.0}
-"""Sums over all bodies while none has been sampled yet."""
+"""Sums over all bodies before the first sample."""
 
 
 class LivePour:
-    """A pour with play and pause, live parameters, frames and reports. One thread only (the one with Taichi)."""
+    """A pour with play and pause, live parameters, frames and reports. For one thread only (the one with Taichi)."""
 
     def __init__(
         self, start: Start, screen: Publisher, report: Callable[[Report], None], reading: Connection | None = None
     ) -> None:
-        """``reading``: a line to a process that reads angles; without it they are read between two launches."""
+        """``reading``: connection to a process that reads angles; without it they are read between two launches."""
         self._screen, self._report = screen, report
         self._angles = AngleReader(reading, clock.perf_counter)
         self._throttle = Throttle(speed=1.0)
@@ -77,7 +77,7 @@ class LivePour:
         self._begin(start)
 
     def obey(self, command: Command) -> None:
-        """Carry out ``command``; parameters that are refused become an event, never an exception."""
+        """Carry out ``command``; refused parameters become an event, never an exception."""
         match command:
             case Start():
                 self._begin(command)
@@ -87,11 +87,11 @@ class LivePour:
             case Pause():
                 self._paused, self._run_until = True, -math.inf
                 self._keep()
-                # What stands on the screen is the moment that is told, not the last frame that was due before it.
+                # The screen is to show the moment that is reported, not the last frame that was due before it.
                 self._observe()
                 self._publish()
             case Step(duration=duration):
-                # Steps that are asked for while one runs are added to it.
+                # Steps requested while one runs are added to it.
                 self._paused, self._run_until = True, max(self._run_until, self._pour.time) + duration
                 self._throttle.restart(clock.perf_counter(), self._pour.time)
             case RunTo(time=time):
@@ -114,13 +114,13 @@ class LivePour:
         self._report(self.status())
 
     def seconds_to_wait(self) -> float | None:
-        """Wall time until the next launch is due; None while nothing is to be done."""
+        """Wall time until the next launch is due; None while there is nothing to do."""
         if self._pour.steps_due(1) == 0 or self._stepped:
             return None
         return max(0.0, self._throttle.wait(clock.perf_counter(), self._pour.time))
 
     def advance(self) -> None:
-        """Run one short launch, then publish and report what is due."""
+        """Run one short launch, then publish and report whatever is due."""
         steps = self._pour.steps_due(min(self._throttle.steps(self._pour.dt), self._steps_to_stop()))
         before = clock.perf_counter()
         decided = launch(self._pour, steps)
@@ -134,7 +134,7 @@ class LivePour:
         self._angles.hear()
         if over or self._angles.due(self._pour.time):
             self._observe()
-        # The status goes first: who sees the last frame of a pour can know that it was the last.
+        # The status goes first, so that a reader of the last frame of a pour can know that it is the last.
         if over or self._paused or now - self._reported >= STATUS_INTERVAL:
             self._reported = now
             self._report(self.status())
@@ -144,7 +144,7 @@ class LivePour:
             self._screen.publish_due(self._pour, self._generation, now)
 
     def status(self) -> Status:
-        """What the page is told."""
+        """The status for the page."""
         pour = self._pour
         state = SessionState.RUNNING
         if pour.outcome != Outcome.RUNNING:
@@ -200,12 +200,12 @@ class LivePour:
         )
 
     def _keep(self) -> None:
-        """Keep the present moment, so that the person at the screen can come back to it."""
+        """Keep the present moment, so that the user can return to it."""
         if self._pour.outcome != Outcome.NON_FINITE:
             self._history.add(Moment(keep(self._pour), self._scene, self._angles.newest, self._retuned))
 
     def _go_back(self, time: float) -> None:
-        """Bring everything back to how it was at ``time`` [s], or as early as is kept, and pause."""
+        """Restore everything as it was at ``time`` [s], or at the earliest moment kept, and pause."""
         self._paused, self._run_until = True, -math.inf
         found = self._history.back_to(time, self._pour.time)
         if found is None:
@@ -217,7 +217,7 @@ class LivePour:
         self._angles.forget(moment.angles)
         self._retuned = moment.retuned
         self._dt_limit = stability_limit(self._pour.scene)
-        # What was thinned out of the history is run again: the same bits, up to the next change that a person made.
+        # What was thinned out of the history is simulated again: the same bits, up to the next change by the user.
         while (left := self._whole_steps(until)) > 0 and (steps := self._pour.steps_due(left)) > 0:
             launch(self._pour, steps)
         self._keep()
@@ -248,7 +248,7 @@ class LivePour:
         self._throttle.restart(clock.perf_counter(), self._pour.time)
 
     def _disturb(self, act: Callable[[], None]) -> None:
-        """Carry out ``act`` on the pour, as an event that the pour can be brought back past, and to."""
+        """Carry out ``act`` on the pour, as an event to which, and past which, the pour can be brought back."""
         before = self._pour.disturbance
         try:
             act()
@@ -279,18 +279,18 @@ class LivePour:
 
     @property
     def _stepped(self) -> bool:
-        """Whether it stands still: paused, and the end of a step of the person at the screen is reached."""
+        """Whether the pour stands still: paused, and the end of the user's step is reached."""
         return self._paused and self._pour.time >= self._run_until
 
     def _steps_to_stop(self) -> int:
-        """Steps to the first that reaches the end of a step of the person at the screen; without end while playing."""
+        """Time steps to the first that reaches the end of the user's step; unlimited while playing."""
         if not self._paused:
             return sys.maxsize
-        # Less a hair: a sum of steps must not miss its end by rounding and take one more.
+        # Less a small tolerance: rounding in a sum of steps must not add one more.
         return max(1, math.ceil((self._run_until - self._pour.time) / self._pour.dt - 1e-6))
 
     def _whole_steps(self, time: float) -> int:
-        """Steps that end at or before ``time`` [s], but for rounding."""
+        """Time steps that end at or before ``time`` [s], within rounding."""
         return math.floor((time - self._pour.time) / self._pour.dt + 1e-6)
 
     def _event(self, text: str) -> None:
@@ -298,9 +298,9 @@ class LivePour:
 
 
 class Publisher:
-    """Publishes one pour after the other; ``wall`` is the present moment [s] on the caller's clock.
+    """Publishes one pour after another; ``wall`` is the present time [s] on the caller's clock.
 
-    The last finite state stays on the screen when that of a pour is no longer finite.
+    If the state of a pour is no longer finite, the last finite state stays on the screen.
     """
 
     def __init__(self, frames: FrameWriter, details: DetailWriter) -> None:
@@ -309,7 +309,7 @@ class Publisher:
         self._framed = self._detailed = -math.inf
 
     def watch(self, order: Watch) -> None:
-        """What is looked at from now on."""
+        """Publish the details that ``order`` asks for from now on."""
         self._watch = order
 
     def publish(self, pour: Pour, generation: int, wall: float) -> None:
@@ -318,7 +318,7 @@ class Publisher:
         self._detail(pour, generation, wall)
 
     def publish_due(self, pour: Pour, generation: int, wall: float) -> None:
-        """Publish what has not been for its interval."""
+        """Publish what has not been published for its interval."""
         if wall - self._framed >= FRAME_INTERVAL:
             self._frame(pour, generation, wall)
         if wall - self._detailed >= DETAIL_INTERVAL:
@@ -337,7 +337,7 @@ class Publisher:
 
 
 def begun(scene: Scene, seed: int, announce: Callable[[str], None]) -> Pour:
-    """A pour of ``scene`` before its first launch but one step; ``announce`` is told what takes long."""
+    """A pour of ``scene`` after a single step; ``announce`` is told what takes long."""
     announce("fitting member spheres to the shapes")
     for body in scene.bodies:
         _ = body.clump  # fitted once per process and shape; the pour below takes it from the cache
@@ -348,7 +348,7 @@ def begun(scene: Scene, seed: int, announce: Callable[[str], None]) -> Pour:
 
 
 def _compile(pour: Pour) -> None:
-    """Compile every kernel now, those of a change of stiffness too, so that the first slider does not stall."""
+    """Compile every kernel now, also those for a change of stiffness, so that the first slider does not stall."""
     launch(pour, pour.steps_due(1))
     kinds = pour.batch.capacity.kinds
     pour.batch.scale_springs(0, np.ones((kinds, kinds)))
@@ -356,12 +356,12 @@ def _compile(pour: Pour) -> None:
 
 
 def endless(scene: Scene) -> Scene:
-    """``scene`` without the limit on simulated time: in the live view the person at the screen ends a pour."""
+    """``scene`` without the limit on simulated time: in the live view, the user ends a pour."""
     return dataclasses.replace(scene, numerics=dataclasses.replace(scene.numerics, max_time=math.inf))
 
 
 def launch(pour: Pour, steps: int) -> bool:
-    """Run ``steps``; True at a moment of decision, before which nobody asks for the world's summary."""
+    """Run ``steps``; True if they end at a decision, which needs the world's summary; other launches do not read it."""
     launched = np.array([steps], dtype=np.int32)
     if not pour.decides_after(steps):
         pour.batch.run(launched)

@@ -1,7 +1,6 @@
-"""What crosses the border between the page's process and the solver process, apart from frames.
+"""Messages between the page's process and the solver process, apart from frames.
 
-Commands go in, statuses and events come out. All are frozen and hold no more than numbers, texts and the
-scene.
+Commands go in, statuses and events come out. All are frozen and hold only numbers, texts and the scene.
 """
 
 from __future__ import annotations
@@ -29,13 +28,13 @@ class SessionState(StrEnum):
     FAILED = "failed"
     """The solver raised an error and stopped."""
     DIED = "died"
-    """The process went away without a word (killed, out of memory)."""
+    """The process ended without a message (killed, out of memory)."""
     CLOSED = "closed"
 
 
 @dataclass(frozen=True)
 class Start:
-    """Drop what there is and pour ``scene`` with ``seed``; ``generation`` numbers the pours of a session."""
+    """Drop the present pour and pour ``scene`` with ``seed``; ``generation`` numbers the pours of a session."""
 
     scene: Scene
     seed: int
@@ -75,7 +74,7 @@ class StepBack:
 
 @dataclass(frozen=True)
 class SetParameters:
-    """New values (SI, or text with a unit) of live parameters by path, taken over together."""
+    """New values (SI, or text with a unit) of live parameters by path, applied together."""
 
     values: Mapping[str, float | str]
 
@@ -96,18 +95,18 @@ class SetPull:
 
 @dataclass(frozen=True)
 class SetSpeed:
-    """Wanted ratio of simulated to wall time; the solver goes as fast as it can up to that."""
+    """Wanted ratio of simulated to wall time; the solver runs as fast as it can up to that."""
 
     factor: float
 
 
 @dataclass(frozen=True)
 class Watch:
-    """Whether velocities, loads and contacts are looked at: nothing is read of them otherwise."""
+    """Whether velocities, loads and contacts are shown: otherwise they are not read."""
 
     wanted: bool
     body: int | None = None
-    """A body, by its order of entry, all of whose contacts are wanted."""
+    """A body, by its order of entry, whose contacts are all wanted."""
 
 
 @dataclass(frozen=True)
@@ -122,18 +121,18 @@ Command = (
 
 @dataclass(frozen=True)
 class Status:
-    """State of the live pour, as the solver process knows it. SI units."""
+    """State of the live pour, as known to the solver process. SI units."""
 
     state: SessionState
     message: str
     scene: Scene
-    """The scene as it is in force: with every parameter that was changed since the start."""
+    """The scene in force: with every parameter that was changed since the start."""
     seed: int
     generation: int
     speed: float
     """Wanted ratio of simulated to wall time."""
     real_time_factor: float = 0.0
-    """Measured ratio of simulated to wall time over the last second; 0 while time stands."""
+    """Measured ratio of simulated to wall time over the last second; 0 while time is stopped."""
     capped: bool = False
     """The solver cannot keep the wanted speed."""
     phase: Phase = Phase.FILL
@@ -142,9 +141,9 @@ class Status:
     dt: float = 0.0
     """Time step [s]."""
     dt_limit: float = math.nan
-    """Time step from which on the motion is unstable [s] (``solver.scenes.time_step.stability_limit``)."""
+    """Time step above which the motion is unstable [s] (``solver.scenes.time_step.stability_limit``)."""
     earliest: float = math.nan
-    """Simulated time [s] to which the pour can be brought back."""
+    """Earliest simulated time [s] to which the pour can be brought back."""
     bodies: int = 0
     """Bodies that have entered."""
     bodies_planned: int = 0
@@ -155,20 +154,20 @@ class Status:
     poured_mass: float = 0.0
     """Mass that is to be poured [kg]."""
     kinetic_energy: float = 0.0
-    """Of translation and rotation, all bodies [J]."""
+    """Of translation and rotation, over all bodies [J]."""
     contacts: int = 0
     """Pairs of spheres, and of sphere and wall, that touch."""
     gate_shut: bool = False
     energy_put_in: float | None = None
     """Elastic energy that the last change of parameters put into the contacts [J]; None before the first change."""
     disturbance: str = ""
-    """What is done to the pile now, in words: the plate is shaken, a body is pulled; empty where nothing is."""
+    """What is being done to the pile, in words: the plate is shaken, a body is pulled; empty if nothing."""
     disturbed: bool = False
-    """Something of the kind was done since the pour began."""
+    """Whether such a thing was done since the pour began."""
     observables: Mapping[str, Value] = field(default_factory=dict)
     """Angles of the pile as it is now, renewed about every 0.1 s of simulated time; empty until there is a pile."""
     outline: Outline | None = None
-    """Silhouette of the first view with the lines that the left and the right angle are those of, read with them."""
+    """Silhouette of the first view, with the lines that give the left and right angles; read together with them."""
 
 
 @dataclass(frozen=True)
@@ -179,14 +178,14 @@ class Event:
     time: float
     text: str
     is_change: bool = False
-    """Whether it is a parameter that was changed, ``text`` then being ``path: old → new``."""
+    """Whether a parameter was changed; ``text`` is then ``path: old → new``."""
     is_order: bool = False
-    """Whether somebody asked for something else: another pour, a study."""
+    """Whether the user asked for something else: another pour, a study."""
 
 
 @dataclass(frozen=True)
 class Failure:
-    """The last word of a solver process that met an error."""
+    """The last message of a solver process that met an error."""
 
     message: str
 

@@ -1,7 +1,7 @@
-"""A recorded pour that is shown while the solver loads: the very scene and seed, or nothing.
+"""A recorded pour that is shown while the solver loads: of exactly this scene and seed, or none.
 
 ``make preview`` pours the shipped study's scene and writes ``explorer/previews/<first digits of its key>.npz``; a test
-holds the file to the key (`solver.pours.pour_key`) of what ``explorer serve`` begins with.
+checks that the file has the key (`solver.pours.pour_key`) of the pour with which ``explorer serve`` begins.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from solver import Scene, npz_arrays, pour_key
 
 FOLDER = Path(__file__).parents[1] / "previews"
 DIGITS = 16
-"""Of the key, in the name of a file."""
+"""Digits of the key in the name of a file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class Preview:
     """Linear size relative to the declared one, shape (n,)."""
 
     def frame(self, elapsed: float, generation: int) -> Frame:
-        """The frame of ``elapsed`` [s] after the beginning; the last one from its time on. Numbers are negative."""
+        """The frame ``elapsed`` [s] after the beginning; after the end, the last one. Frame numbers are negative."""
         k = max(int(np.searchsorted(self.times, elapsed, side="right")) - 1, 0)
         return Frame(
             number=-1 - k,
@@ -58,7 +58,7 @@ def preview_path(scene: Scene, seed: int, folder: Path = FOLDER) -> Path:
 
 
 def load_preview(scene: Scene, seed: int, folder: Path = FOLDER) -> Preview | None:
-    """The recording of this very pour; None where none is shipped."""
+    """The recording of exactly this pour; None if none is shipped."""
     path = preview_path(scene, seed, folder)
     if not path.is_file():
         return None

@@ -1,8 +1,8 @@
 """A live pour in its own process: commands in, frames and statuses out. No viser, no Taichi.
 
 A Taichi call holds the interpreter's lock until it returns, so the solver must not share a process with the
-page. Either end survives the other: a solver that dies becomes the state ``died`` with a message, and a
-restart brings a new one; a solver whose parent is gone ends by itself.
+page. Each end copes with the loss of the other: if the solver dies, the state becomes ``died`` with a message, and a
+restart brings a new solver; a solver whose parent is gone ends by itself.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Session:
     def start(self, scene: Scene, seed: int, source: SceneSource | None = None) -> None:
         """Pour ``scene`` with ``seed``, in a new process if there is none. Returns at once.
 
-        ``source``: what changes of the scene are counted from; None: as before, at first the scene itself.
+        ``source``: the default against which changes are listed; None: as before, at first the scene itself.
 
         Raises ParameterError for a scene with more bodies than a frame holds.
         """
@@ -105,17 +105,17 @@ class Session:
         self._send(Pause())
 
     def step(self) -> None:
-        """Go on by one sample interval of the scene (``numerics.sample_interval``), then stand still."""
+        """Run for one sample interval of the scene (``numerics.sample_interval``), then pause."""
         self._send(Step(self._present().scene.numerics.sample_interval))
 
     def run_to(self, time: float) -> None:
-        """Go on to simulated ``time`` [s], then stand still there; asked of a pour that was just started, too."""
+        """Run to simulated ``time`` [s], then pause there; also allowed for a pour that was just started."""
         self._send(RunTo(time))
 
     def step_back(self, duration: float | None = None) -> None:
-        """Go back by ``duration`` [s], by default one sample interval, with everything as it was then, parameters too.
+        """Go back by ``duration`` [s], by default one sample interval; everything is as it was then, parameters too.
 
-        It stands still there, and repeats the same bits until something is changed.
+        The pour pauses there, and repeats the same bits until something is changed.
         """
         self._send(StepBack(self._present().scene.numerics.sample_interval if duration is None else duration))
 
@@ -128,10 +128,10 @@ class Session:
         self._speed = factor
 
     def set_parameters(self, values: Mapping[str, float | str]) -> None:
-        """Change live parameters of the running pour by path (SI, or text with a unit), all of them together.
+        """Change live parameters of the running pour by path (SI, or text with a unit), all together.
 
         Raises ParameterError for an unknown path, a value that is not finite or out of range, and a parameter
-        that acts on restart only. What the solver took over stands in ``status().scene``.
+        that acts on restart only. ``status().scene`` holds what the solver has applied.
         """
         scene = self._present().scene
         known = parameters(scene)
@@ -142,15 +142,15 @@ class Session:
         self._send(SetParameters(dict(values)))
 
     def move_plate(self, motion: PlateMotion) -> None:
-        """Tap or shake the plate of the running pour. What comes of it is an event, a refusal too."""
+        """Tap or shake the plate of the running pour. The outcome is reported as an event, even if it is a refusal."""
         self._send(MovePlate(motion))
 
     def pull(self, pull: Pull | None) -> None:
-        """Pull one body until another call says otherwise; None: let go."""
+        """Pull one body until the next call; None: let go."""
         self._send(SetPull(pull))
 
     def watch(self, wanted: bool, body: int | None = None) -> None:
-        """Say whether :meth:`details` are looked at, and of which body (by order of entry) all contacts are wanted."""
+        """Say whether :meth:`details` are wanted, and of which body (by order of entry) all contacts are wanted."""
         if self._watch == Watch(wanted, body):
             return
         self._watch = Watch(wanted, body)
@@ -158,7 +158,7 @@ class Session:
             self._process.send(self._watch)
 
     def details(self) -> Details | None:
-        """Velocities, loads and contacts of the present pour, as they were read last; None before they were."""
+        """Velocities, loads and contacts of the present pour, as last read; None before the first reading."""
         details = self._process.details.newest() if self._process is not None else None
         return details if details is not None and details.generation == self._generation else None
 
@@ -168,7 +168,7 @@ class Session:
         return frame if frame is not None and frame.generation == self._generation else None
 
     def status(self) -> Status:
-        """The newest status, after taking in all that the solver process has sent."""
+        """The newest status, after processing all that the solver process has sent."""
         self._listen()
         return self._present()
 
@@ -188,14 +188,14 @@ class Session:
 
     @property
     def source(self) -> SceneSource:
-        """Where the scene came from: the default that its changes are counted from."""
+        """Where the scene came from: the default against which its changes are listed."""
         if self._source is None:
             raise SessionError("no pour has been started")
         return self._source
 
     @property
     def process_id(self) -> int | None:
-        """Process id of the solver process, None where there is none."""
+        """Process id of the solver process; None if there is none."""
         return self._process.process_id if self._process is not None and self._process.alive else None
 
     def _present(self) -> Status:
@@ -204,7 +204,7 @@ class Session:
         return self._status
 
     def _renewed(self) -> SolverProcess:
-        """A new process in place of the one there was."""
+        """A new process in place of the former one."""
         if self._process is not None:
             self._process.kill()
         self._process = SolverProcess()
@@ -219,7 +219,7 @@ class Session:
     def _listen(self) -> None:
         if self._process is None or self._status is None or self._status.state == SessionState.CLOSED:
             return
-        # Asked before the line is emptied: a process that is dead now has said all it will say.
+        # Checked before the messages are read: a process that is dead now has sent all it will send.
         alive = self._process.alive
         for report in self._process.heard():
             self._take(report)

@@ -1,4 +1,4 @@
-"""The solver process: from outside its start, its end and the lines to it; inside, its main function. No viser.
+"""The solver process: from outside, its start, its end and the connections to it; inside, its main function. No viser.
 
 It takes commands until it is told to close or its parent is gone. The parent imports this file too, so Taichi is
 imported inside :func:`run` only.
@@ -24,20 +24,20 @@ if TYPE_CHECKING:
     from explorer.live.live_pour import LivePour
 
 CLOSE_WAIT = 3.0
-"""Seconds that it has to end by itself."""
+"""Seconds that the process has to end by itself."""
 IDLE_WAIT = 0.5
-"""Longest wait [s] for a command before the process looks whether its parent still lives."""
+"""Longest wait [s] for a command before the process checks whether its parent is still alive."""
 
 
 class SolverProcess:
-    """A solver process, started at once, and beside it the one that reads angles for it.
+    """A solver process, started at once, and the process that reads angles for it.
 
-    frames, details: what it shows, by shared memory; readable also after its end.
+    frames, details: what it publishes, in shared memory; readable also after its end.
     """
 
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")
-        # A queue and lines of its own: a process that is killed may leave its queue locked.
+        # Queue and connections belong to this process alone: a process that is killed may leave its queue locked.
         self._commands = context.Queue()
         self._reports, reporting = context.Pipe(duplex=False)
         frames, details = shared_block(context), shared_details(context)
@@ -50,53 +50,53 @@ class SolverProcess:
         with deaf_to_interrupts():
             for process in (self._reader, self._solver):
                 process.start()
-        # With these gone every line has one process at either end, which hears when the other one ends.
+        # With these closed, every connection has one process at each end, which notices when the other one ends.
         for end in (asking, answering, reporting):
             end.close()
 
     @property
     def alive(self) -> bool:
-        """Whether it runs."""
+        """Whether the process runs."""
         return self._solver.is_alive()
 
     @property
     def process_id(self) -> int | None:
-        """Its number in the system."""
+        """Process id in the system."""
         return self._solver.pid
 
     @property
     def exit_code(self) -> int | None:
-        """How it ended; None while it runs."""
+        """Exit code of the process; None while it runs."""
         return self._solver.exitcode
 
     def send(self, *commands: Command) -> None:
-        """Put ``commands`` into its queue, in order."""
+        """Put ``commands`` into the queue of the process, in order."""
         for command in commands:
             self._commands.put(command)
 
     def heard(self) -> list[Report]:
-        """What it has reported since the last call."""
+        """What the process has reported since the last call."""
         reports: list[Report] = []
         try:
             while self._reports.poll():
                 reports.append(self._reports.recv())
         except (EOFError, OSError):
-            pass  # its end of the line is gone
+            pass  # the other end of the connection is gone
         return reports
 
     def close(self) -> None:
-        """Ask it to end, and end it if it does not."""
+        """Ask the process to end, and kill it if it does not."""
         if self.alive:
             self.send(Close())
             self._solver.join(CLOSE_WAIT)
         self.kill()
 
     def kill(self) -> None:
-        """End it now."""
+        """Kill the process now."""
         if self.alive:
             self._solver.kill()
         self._solver.join()
-        self._reader.join()  # its line is cut
+        self._reader.join()  # it ends because its connection is closed
         self._commands.cancel_join_thread()
         self._commands.close()
         self._reports.close()
@@ -105,18 +105,18 @@ class SolverProcess:
 def run(commands: Any, reports: Connection, frames: Any, details: Any, reading: Connection) -> None:
     """Main function of the process: commands in by a queue, reports out, frames and details by shared memory.
 
-    ``reading`` is the line to the process that reads angles. Reports have no queue, whose thread would wait for the
-    interpreter while the solver computes.
+    ``reading`` is the connection to the process that reads angles. Reports do not use a queue, because its thread would
+    wait for the interpreter while the solver computes.
     """
     # Ctrl-C in a terminal reaches the whole group; the parent decides when this process ends.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # The page, and a browser beside it that draws without a graphics card, go first: else what is seen lags behind.
+    # The page, and a browser beside it that draws without a graphics card, go first; otherwise the view lags behind.
     give_way(LIVE)
     try:
         _work(commands, reports, frames, details, reading)
     except BrokenPipeError:
-        return  # nobody listens any more
-    except Exception as error:  # whatever it is, the person at the screen has to hear of it
+        return  # nobody listens any longer
+    except Exception as error:  # whatever it is, the user has to be told
         traceback.print_exc()
         reports.send(Failure(f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"))
 
@@ -145,11 +145,11 @@ def _work(commands: Any, reports: Connection, frames: Any, details: Any, reading
 
 
 def _waiting(commands: Any, pour: LivePour | None) -> list[Command]:
-    """Commands that have come in; waits for one while there is nothing else to do."""
+    """Commands that have arrived; waits for one while there is nothing else to do."""
     wait = None if pour is None else pour.seconds_to_wait()
     found: list[Command] = []
     try:
-        # Even the shortest wait hands the processor over; a pour that is behind the clock has no time for it.
+        # Even the shortest wait yields the processor; a pour that is behind the clock has no time for that.
         found.append(commands.get(block=wait != 0.0, timeout=IDLE_WAIT if wait is None else wait))
         while True:
             found.append(commands.get_nowait())

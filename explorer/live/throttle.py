@@ -6,20 +6,20 @@ import math
 from collections import deque
 
 LAUNCH_WALL = 6e-3
-"""Wall time [s] that one launch of steps aims at: less than a frame, so that a slider acts at the next one. Each launch
-costs some tenths of a millisecond of its own."""
+"""Wall time [s] aimed at for one launch of steps: less than a frame, so that a slider acts at the next frame. Each
+launch costs some tenths of a millisecond of its own."""
 FRAME_WALL = 1.0 / 60.0
 """A launch never covers more simulated time than this times the speed: motion on the screen stays smooth."""
 FIRST_STEPS = 20
-"""Steps of a launch while nothing is known about their cost."""
+"""Steps of a launch while their cost is unknown."""
 MEMORY = 0.7
 """Weight of the past in the running mean of the cost of a step."""
 FORGET_DEBT = 0.1
 """A pour that is further behind the clock than this [s] does not try to catch up."""
 CAPPED = 0.9
-"""A pour that stays below this share of the wanted speed cannot keep it."""
+"""A pour that stays below this share of the wanted speed counts as unable to keep it."""
 CAPPED_WINDOW = 0.5
-"""Wall time [s] before which nothing is said about that."""
+"""Wall time [s] before which a pour is not called capped."""
 WINDOW = 1.0
 """Wall time [s] over which the real-time factor is measured."""
 
@@ -46,7 +46,7 @@ class Throttle:
         return max(1, int(min(affordable, smooth)))
 
     def launched(self, steps: int, took: float, wall: float, time: float) -> None:
-        """Note that ``steps`` took ``took`` and that it is now ``wall``, in the simulation ``time``."""
+        """Note that ``steps`` took ``took``; it is now ``wall`` on the clock and ``time`` in the simulation."""
         cost = took / steps
         self._cost = cost if math.isnan(self._cost) else MEMORY * self._cost + (1.0 - MEMORY) * cost
         self._history.append((wall, time))

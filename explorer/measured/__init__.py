@@ -1,1 +1,1 @@
-"""What a laboratory brings, as a folder of measured data (`doe.measurement`): `explorer new measurement`."""
+"""A laboratory's files become a folder of measured data (`doe.measurement`): `explorer new measurement`."""

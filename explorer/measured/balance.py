@@ -1,13 +1,13 @@
 """A balance's readings over time → the mass that has passed the outlet, its rate, and how slow the balance is.
 
-Of a balance under the pile the reading rises, of one under the vessel it falls. Its first readings are the zero, the
-last tenth of the time has to be level. With M the mass that passed, the rate is the slope of the least-squares line
+The reading of a balance under the pile rises, that of one under the vessel falls. Its first readings are the zero, and
+the last tenth of the time has to be level. With M the mass that passed, the rate is the slope of the least-squares line
 through the readings between 20 and 80 % of M.
 
-A balance follows late. Of first order, τ ẏ + y = m (time constant τ), a mass that grows at the rate q and stops is read
+A balance lags. If it is of first order, τ ẏ + y = m (time constant τ), a mass that grows at the rate q and stops reads
 as y = q (t − τ) before the stop, and afterwards M − y = q τ exp(−(t − t_stop)/τ). The line reaches M at t_stop + τ,
-where M − y = q τ/e: so τ = e (M − y)/q, read there. A flow that fades at its end looks the same, so that this is the
-most that the lag can be; a delay that shifts the whole curve is not seen in it at all.
+where M − y = q τ/e: so τ = e (M − y)/q, read there. A flow that fades at its end looks the same, so this is an upper
+bound of the lag; a delay that shifts the whole curve cannot be seen in it.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ MOST_BYTES = 50_000_000
 FEWEST = 10
 """Readings of the shortest curve."""
 ZERO_SHARE, LEVEL_TIME, LEVEL_SHARE = 0.01, 0.1, 0.02
-"""The zero lasts until this share of the change; the last readings, over this share of the time, differ by no more than
-that share of it."""
+"""The zero lasts until the first share of the change. The last readings, over the second share of the time, differ by
+no more than the third share of the change."""
 STEADY = (0.2, 0.8)
 """Shares of the mass between which the rate is taken."""
 COMPLETE = 0.02
-"""By how much the mass that passed may differ from the poured one and still be all of it."""
+"""Relative difference up to which the mass that passed counts as all of the poured mass."""
 FEW_STEADY = 8
-"""Readings between t10 and t90 below which a note says that they are few."""
+"""Number of readings between t10 and t90 below which a note says that they are few."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,24 +50,24 @@ class BalanceCurve:
     passed: Array
     """Mass that has passed the outlet, shape (k,), from 0 on."""
     total: float
-    """That passed in the end."""
+    """Mass that had passed at the end."""
     interval: float
     """Median time between two readings."""
     rate: float
     """Slope of the middle part [kg/s]."""
     lag: float
-    """Time constant of the balance, at most [s]."""
+    """Upper bound of the balance's time constant [s]."""
 
     def share_time(self, share: float, poured: float) -> float:
-        """Time [s] at which ``share`` of ``poured`` [kg] had passed, linear between readings; NaN if it never had."""
+        """Time [s] at which ``share`` of ``poured`` [kg] had passed, linear between readings; NaN if it never did."""
         return time_of_share(share, self.time, self.passed, self.whole(poured))
 
     def whole(self, poured: float) -> float:
-        """What shares are of [kg]: what passed, where that is all that was ``poured``; else the latter."""
+        """The mass [kg] to which shares refer: what passed, if that counts as all of ``poured``; else ``poured``."""
         return self.total if abs(self.total - poured) <= COMPLETE * poured else poured
 
     def line(self, poured: float, lag: float | None) -> str:
-        """What was read off it, its sampling and its lag; ``lag``: what was stated."""
+        """What was read off the curve, its sampling and its lag; ``lag``: the stated one."""
         said = f"stated, {lag:g} s, and taken off its times" if lag is not None else "not stated, nothing is taken off"
         t10, t90 = (self.share_time(share, poured) for share in (0.1, 0.9))
         between = int(((self.time > t10) & (self.time < t90)).sum())
@@ -80,7 +80,7 @@ class BalanceCurve:
 
 
 def read_balance(path: Path) -> BalanceCurve:
-    """The curve in ``path``, with columns time_s|ms|min and mass_kg|g|mg; others are left out.
+    """The curve in ``path``, with columns time_s|ms|min and mass_kg|g|mg; others are ignored.
 
     Raises CommandError in one line naming file, line and what is allowed.
     """
@@ -126,7 +126,7 @@ def read_balance(path: Path) -> BalanceCurve:
 
 
 def _last(time: Array, values: Array) -> Array:
-    """Of ``values`` those of the last ``LEVEL_TIME`` of the time."""
+    """The ``values`` in the last ``LEVEL_TIME`` of the time."""
     return values[time >= time[-1] - LEVEL_TIME * (time[-1] - time[0])]
 
 

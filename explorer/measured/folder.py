@@ -1,11 +1,11 @@
-"""A folder of measured data (`doe/measurement/README.md`) from what a laboratory brings; and one condition more in it.
+"""A folder of measured data (`doe/measurement/README.md`) from a laboratory's files; and one more condition in it.
 
-The first condition of a folder is fitted. With the second one is held out, as a proposal that is told and stands in the
-file: the one that tells fewer numbers, of two alike the later one, since what is held out is predicted and never
-fitted. Once one is held out, or a role was asked for, roles stay as they are.
+The first condition of a folder is fitted. When a second is added, one of the two is held out, as a proposal that is
+reported and written into the file: the one that gives fewer numbers, or the later one if they are equal, because
+held-out data are predicted and never fitted. Once one is held out, or a role was asked for, roles stay as they are.
 
-The folder is read by the reader of every data set before it appears, and an old one changes only then, its
-``measurement.toml`` last: there is a whole data set at any time.
+The general reader of data sets reads the folder before it appears. An existing folder is changed only after that, its
+``measurement.toml`` last, so that it holds a complete data set at any time.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ from explorer.terminal.measurement import check_text
 from solver import Scene, asset_path, parameters, pour_rig, read_toml, value
 
 FIRST = "A"
-"""Name of the first condition, unless it is given another."""
+"""Name of the first condition, unless another is given."""
 STATED = ("rig.", *(f"insertion.{key}" for key in (*AS_THEY_ARE, "region_height", "drop_speed")), "numerics.duration")
-"""Beginnings of the paths that a condition states itself."""
+"""Beginnings of the paths that a condition can state itself."""
 FREE = ("material", "pair", "body", "contact")
-"""Kinds of parameters that stand for the material in every condition."""
+"""Kinds of parameters that describe the material in every condition."""
 OF_STUDY = "What calibration may move: the factors of the study"
 ASSUMED = (
     f"what calibration may move. Ranges without mean and sd are ± {SPAN:.0%} of the material's values: CHANGE THEM"
@@ -54,22 +54,22 @@ ASSUMED = (
 
 @dataclass(frozen=True)
 class NewCondition:
-    """One condition as it was asked for."""
+    """One condition as requested."""
 
     name: str = FIRST
     role: Role | None = None
     study: str | None = None
-    """Study whose material, set-up and factors the data belong to."""
+    """Study to whose material, set-up and factors the data belong."""
     material: str | None = None
     settings: tuple[str, ...] = ()
-    """path=value of the set-up."""
+    """Items path=value of the set-up."""
     uncertainty: tuple[str, ...] = ()
-    """observable=standard deviation of one value."""
+    """Items observable=standard deviation of one value."""
 
 
 @dataclass(frozen=True, eq=False)
 class WrittenCondition:
-    """What is there now."""
+    """The data set with the new condition."""
 
     measurement: Measurement
     files: tuple[Path, ...]
@@ -79,12 +79,12 @@ class WrittenCondition:
 
 
 def has_data(folder: Path) -> bool:
-    """Whether ``folder`` is one of measured data, to which a condition is added."""
+    """Whether ``folder`` holds measured data, to which a condition can be added."""
     return (folder / FILE).exists()
 
 
 def written_text(found: WrittenCondition) -> str:
-    """What was written, what was read of it, and what all the data can tell."""
+    """What was written, what was read from it, and what all the data can tell."""
     lines = [*(f"wrote {path}" for path in found.files), *(f"note: {line}" for line in found.told)]
     return "\n".join(lines) + f"\n\n{check_text(found.measurement)}\n\n{found.proposal}"
 
@@ -135,7 +135,7 @@ def _added(folder: Path, asked: NewCondition, brought: Brought) -> WrittenCondit
         raise CommandError(f"--condition {asked.name}: exists already; allowed: a name other than {', '.join(names)}")
     scene = _set(before.conditions[0].scene, asked)
     found = read_brought(brought, scene)
-    # Beside the folder, so that what its files name relative to it is found.
+    # Beside the folder, so that relative paths in its files stay valid.
     staged = Path(tempfile.mkdtemp(prefix=".measurement-", dir=folder.resolve().parent))
     try:
         shutil.copytree(folder, staged, dirs_exist_ok=True)
@@ -185,7 +185,7 @@ def _set(scene: Scene, asked: NewCondition) -> Scene:
 
 
 def _of_study(file: Path) -> tuple[dict[str, Any], list[str]]:
-    """[parameters] of the factors of a study, and a line on those that no data set can leave open."""
+    """[parameters] from the factors of a study, and a line on those that no data set can leave open."""
     study = load_study(str(file))
     open_ = [f for f in study.factors if f.path.startswith(tuple(f"{kind}." for kind in FREE))]
     free = {f.path: {"low": float(f.low), "high": float(f.high)} for f in open_ if not isinstance(f.low, str)}
@@ -194,7 +194,7 @@ def _of_study(file: Path) -> tuple[dict[str, Any], list[str]]:
 
 
 def _starter_ranges(scene: Scene, material: str) -> dict[str, Any]:
-    """[parameters] as a starter study has factors; mean and sd where the material's file says they were measured."""
+    """[parameters] like the factors of a starter study; mean and sd if the material's file has measured ones."""
     file, declared = asset_path("materials", material), parameters(scene)
     measured = read_toml(file).get("measured", {})
     free: dict[str, Any] = {}
@@ -230,7 +230,7 @@ def _entry(
     brought: Brought,
     free: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """The ``[[condition]]`` that makes ``scene`` of ``base``, but for the calibrated paths ``free``."""
+    """The ``[[condition]]`` that turns ``base`` into ``scene``, except for the calibrated paths ``free``."""
     bare, fed = in_rig(base, scene.rig.name), scene.insertion
     rig = {path.removeprefix("rig."): value(scene, path) for path in parameters(scene) if path.startswith("rig.")}
     rig = {key: given for key, given in rig.items() if f"rig.{key}" not in free}
@@ -254,7 +254,7 @@ def _entry(
 
 
 def _unstated(scene: Scene, measurement: Measurement, name: str) -> list[str]:
-    """A line on what of ``scene`` the folder could not say, but for what is calibrated."""
+    """A line on what the folder cannot state of ``scene``, apart from what is calibrated."""
     free = {parameter.path for parameter in measurement.parameters}
     (now,) = (one.scene for one in measurement.conditions if one.name == name)
     lost = [
@@ -305,7 +305,7 @@ def _moved(files: Sequence[Path], made: Path, folder: Path) -> tuple[Path, ...]:
 
 
 def _loaded(made: Path, folder: Path) -> Measurement:
-    """The data set in ``made``, which is to become ``folder``: what is wrong with it is named by that."""
+    """The data set in ``made``, which is to become ``folder``; errors name the latter."""
     try:
         measurement = load_measurement(made)
     except MeasurementError as error:
@@ -335,7 +335,7 @@ def _uncertainty(asked: NewCondition) -> dict[str, float | str]:
 
 
 def _with_uncertainty(text: str, asked: NewCondition, folder: Path) -> str:
-    """``text`` with a table of what was stated, where it has none."""
+    """``text`` with a table of the stated uncertainties; an error if it has one already."""
     stated = _uncertainty(asked)
     if stated and "uncertainty" in tomlkit.parse(text):
         raise CommandError(f"--uncertainty: {folder / FILE} has [uncertainty]; state it there")
@@ -347,7 +347,7 @@ def _with_uncertainty(text: str, asked: NewCondition, folder: Path) -> str:
 
 
 def _numbers(measurement: Measurement) -> dict[str, int]:
-    """Condition → how many of its summaries have a spread."""
+    """Condition → number of its summaries that have a spread."""
     return {
         one.condition: sum(
             math.isfinite(number.standard_error) and number.standard_error > 0.0 for number in one.resolutions
@@ -357,7 +357,7 @@ def _numbers(measurement: Measurement) -> dict[str, int]:
 
 
 def _to_hold_out(measurement: Measurement) -> str | None:
-    """Name of the condition that tells fewest numbers, of several the last; None where one is held out already."""
+    """Name of the condition that gives the fewest numbers, the last of several; None if one is held out already."""
     if measurement.holdout:
         return None
     numbers = _numbers(measurement)

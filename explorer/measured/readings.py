@@ -1,13 +1,13 @@
-"""What a laboratory brings of one condition → rows of its table, and files that the reader of data sets takes itself.
+"""A laboratory's files of one condition → rows of its table, and files that the reader of data sets reads itself.
 
-    photographs       angle_of_repose_deg@0, read anew from the pictures whenever the folder is; with a scale height_m;
-                      of the face of a drum that turns dynamic_angle_deg and surface_profile_m, read once
+    photographs       angle_of_repose_deg@0, read again from the pictures whenever the folder is read; with a scale also
+                      height_m; of the face of a turning drum dynamic_angle_deg and surface_profile_m, read once
     angles            angle_of_repose_deg; in a drum dynamic_angle_deg, below a draw-down box angle_of_repose_deg@0
-    a balance         discharge_time_s; with the time at which the flow was let go also t10, t50, t90 and the curve
+    a balance         discharge_time_s; with the time at which the flow was released also t10, t50, t90 and the curve
     scans             height_profile_m in rings of the solver's width, and the surfaces themselves
     a drum's sheet    dynamic_angle_deg, as `explorer lab drum` reads it: the mean of upper and lower angle
 
-The k-th photograph, angle, balance file, scan and row of a sheet are of pour k.
+The k-th photograph, angle, balance file, scan and row of a sheet belong to pour k.
 """
 
 from __future__ import annotations
@@ -41,21 +41,21 @@ Array = npt.NDArray[np.float64]
 ScanUnit = Literal["m", "cm", "mm", "um"]
 
 ANGLES = ("dynamic_angle_deg", "angle_of_repose_deg", "angle_of_repose_deg@0")
-"""What an angle without a name is, the first one that the rig gives."""
+"""Observables for an angle without a name: the first one that the rig gives."""
 VIEW, DYNAMIC, FLOWED = "angle_of_repose_deg@0", "dynamic_angle_deg", "discharge_time_s"
 SHARES = {"discharge_t10_s": 0.1, "discharge_t50_s": 0.5, "discharge_t90_s": 0.9}
 SURFACE = "surface_profile_m"
 SURFACE_PLACES = 13
-"""Places of a drum's free surface."""
+"""Points along a drum's free surface."""
 PLACES = 21
-"""Times of a discharged mass's curve."""
+"""Points of a curve of discharged mass."""
 SAME = 0.02
-"""By how much the Froude number of a drum's sheet and of the rig may differ."""
+"""Relative difference allowed between the Froude numbers of a drum's sheet and of the rig."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One number of a condition's table, SI, angles in degrees."""
+    """One number of a condition's table; SI, angles in degrees."""
 
     replicate: int
     observable: str
@@ -74,9 +74,9 @@ class Brought:
     """24.1,25.0,… or FILE.csv, FILE.csv:COLUMN."""
     balances: tuple[Path, ...] = ()
     starts: tuple[float, ...] = ()
-    """When the gate opened, without one when the first body entered, on each balance's clock, or one for all [s]."""
+    """When the gate opened or, without a gate, the first body entered: on each balance's clock, or one for all [s]."""
     lag: float | None = None
-    """Of the balance [s]."""
+    """Lag of the balance [s]."""
     scans: tuple[Path, ...] = ()
     scan_unit: ScanUnit = "m"
     drum: str | None = None
@@ -85,25 +85,25 @@ class Brought:
 
 @dataclass(frozen=True)
 class Readings:
-    """What was read: rows, files to keep beside them, and what to tell whoever brought it."""
+    """What was read: rows, files to keep beside them, and what to tell the user."""
 
     rows: list[Row] = field(default_factory=list)
     photographs: tuple[Path, ...] = ()
-    """Of piles: they are read again with the folder."""
+    """Photographs of piles, which are read again with the folder."""
     faces: tuple[Path, ...] = ()
-    """Of a drum's face."""
+    """Photographs of a drum's face."""
     scans: tuple[Path, ...] = ()
     sources: list[str] = field(default_factory=list)
-    """A line on every source, for the head of the table."""
+    """One line on each source, for the head of the table."""
     told: list[str] = field(default_factory=list)
 
     def add(self, observable: str, values: Sequence[float]) -> None:
-        """The values of a scalar, one for each pour; those that are not finite were not measured."""
+        """Add the values of a scalar, one for each pour; those that are not finite were not measured."""
         self.rows.extend(Row(k, observable, value) for k, value in enumerate(values, start=1) if math.isfinite(value))
 
 
 def read_brought(brought: Brought, scene: Scene) -> Readings:
-    """Everything in ``brought`` of pours in the rig of ``scene``.
+    """Read everything in ``brought``, from pours in the rig of ``scene``.
 
     Raises CommandError, MeasurementError or LaboratoryError in one line naming the file, its key and what is allowed.
     """
@@ -158,7 +158,7 @@ def _mean_and_sd(values: Sequence[float]) -> str:
 
 
 def _photographs(brought: Brought, found: Readings) -> None:
-    """Every picture has to show a pile: one that shows none would be a pour without a number."""
+    """Read pictures of piles; each has to show a pile, because one without would be a pour without a number."""
     piles = _each(brought.photographs, lambda picture: read_photograph(picture, brought.pixel))
     angles, heights = [one.angles.mean.value_deg for one in piles], [one.height for one in piles]
     found.add(VIEW, angles)
@@ -169,7 +169,7 @@ def _photographs(brought: Brought, found: Readings) -> None:
 
 
 def _faces(brought: Brought, rig: RotatingDrum, found: Readings) -> None:
-    """Every picture has to show the whole face of the drum, whose diameter is its scale."""
+    """Read pictures of a drum; each has to show its whole face, whose diameter is the scale."""
     if brought.pixel is not None:
         raise CommandError(
             "--scale: not allowed for pictures of a drum, whose diameter is the scale; state --set rig.diameter"
@@ -202,7 +202,7 @@ Reading = TypeVar("Reading")
 
 
 def _each(files: Sequence[Path], read: Callable[[Picture], Reading | Refusal]) -> list[Reading]:
-    """What ``read`` makes of each picture, which has to be of a pour of its own."""
+    """What ``read`` gives for each picture; no two may be the same, as each has to show another pour."""
     seen: dict[bytes, Path] = {}
     found = []
     for file in files:
@@ -216,7 +216,7 @@ def _each(files: Sequence[Path], read: Callable[[Picture], Reading | Refusal]) -
 
 
 def _angles(text: str) -> list[float]:
-    """``24.1,25.0`` or a column of a file."""
+    """Angles from ``24.1,25.0`` or from a column of a file."""
     if ".csv" not in text and ".xlsx" not in text:
         try:
             values = [float(part) for part in text.split(",")]
@@ -247,7 +247,7 @@ def _checked_angles(values: list[float], where: str) -> list[float]:
 
 
 def _named_part(text: str) -> tuple[Path, str]:
-    """FILE or FILE:PART."""
+    """Path and part of FILE or FILE:PART."""
     file, _, part = text.rpartition(":")
     return (Path(file), part) if file and not Path(text).exists() else (Path(text), "")
 
@@ -298,7 +298,7 @@ def _balances(brought: Brought, scene: Scene, found: Readings) -> None:
 
 
 def _curves(curves: Sequence[BalanceCurve], starts: Sequence[float], lag: float, poured: float) -> Iterator[Row]:
-    """``discharged_mass_kg`` at times that all ``curves`` share, until the slowest has passed."""
+    """``discharged_mass_kg`` at times common to all ``curves``, until the slowest is complete."""
     ends = [float(curve.time[-1]) - start - lag for curve, start in zip(curves, starts, strict=True)]
     done = [curve.share_time(0.99, curve.total) - start - lag for curve, start in zip(curves, starts, strict=True)]
     for k, (curve, start) in enumerate(zip(curves, starts, strict=True), start=1):
@@ -314,7 +314,7 @@ def _scans(brought: Brought, found: Readings) -> None:
         if file.suffix.lower() not in known or not file.is_file():
             raise CommandError(f"--scan {file}: allowed: an existing file ending in {', '.join(known)}")
         scans.append(read_scan(file, ScanSettings(unit=brought.scan_unit)))
-    # A ring is known where every scan reaches around it.
+    # A ring is known if every scan extends all around it.
     reach = min(
         float(min(scan.points[:, :2].max(axis=0).min(), -scan.points[:, :2].min(axis=0).max())) for scan in scans
     )

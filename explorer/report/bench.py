@@ -1,4 +1,4 @@
-"""The report of a bench test: what was measured and how well, the curves and replicates behind it, and the readings."""
+"""The report of a bench test: what was measured and how well, its curves and replicates, and the readings."""
 
 from __future__ import annotations
 
@@ -54,16 +54,16 @@ PARAMETERS = (
 )
 TARGET = "A target, no parameter: parameters are found by it. Its like is simulated by {}."
 DECISIVE = {"dimensions": "geometric_mean_diameter", "sieve": "d50", "drum": "dynamic_angle"}
-"""Test → the quantity of its verdict, where that is not the first one."""
+"""Test → the quantity of its verdict, if not the first one."""
 MOST_NAMED = 3
-"""Results that a verdict names."""
+"""Results that a verdict names at most."""
 MOST_ROWS = 40
-"""Readings that the page shows; the data have all."""
+"""Readings that the page shows at most; the data files have all."""
 
 
 @dataclass(frozen=True)
 class Readings(Record):
-    """One file of readings as its test took them [SI]."""
+    """One file of readings as the test read them [SI]."""
 
     test: str
     file: str
@@ -73,7 +73,7 @@ class Readings(Record):
 
 @dataclass(frozen=True)
 class BenchResult(Record):
-    """The content of ``bench.json``: what a test gave, and the readings that it was taken from."""
+    """The content of ``bench.json``: the results of a test, and the readings behind them."""
 
     NAME: ClassVar[str] = "bench.json"
 
@@ -95,7 +95,7 @@ def _readings(test: str, path: Path) -> Readings:
 
 
 def write_curves(path: Path, found: BenchResult) -> None:
-    """Write the report of a test with curves as one page; CommandError without curves."""
+    """Write the report of a test with curves as one page; raises CommandError without curves."""
     if not found.result.curves:
         raise CommandError("--plot: single readings only, no curve to draw")
     write_whole(path, page(bench_report(found)))
@@ -124,7 +124,7 @@ def bench_report(found: BenchResult) -> Report:
 
 
 def banner(result: LabResult) -> Banner:
-    """What was measured; a single replicate has no interval and measures nothing."""
+    """The verdict: what was measured; a single replicate has no interval, so it does not count as measured."""
     found = [one for one in result.derived if one.name not in CONDITIONS]
     alone = [one for one in found if one.summary.n < 2]
     outliers = sum(len(one.summary.outliers) for one in found)
@@ -150,7 +150,7 @@ def banner(result: LabResult) -> Banner:
 
 
 def _results(result: LabResult, found: list[Derived]) -> str:
-    """The results that decide, each with its interval; a name that several share is said once."""
+    """The decisive results, each with its interval; a name shared by several is given once."""
     names = {one.name for one in found}
     wanted = DECISIVE.get(result.test, found[0].name)
     of: list[Derived | Estimate] = [one for one in found if one.name == (wanted if wanted in names else found[0].name)]
@@ -164,7 +164,7 @@ def _results(result: LabResult, found: list[Derived]) -> str:
 
 
 def _value(one: Derived | Estimate) -> str:
-    """Mean ± half its interval, to the second digit of the ±."""
+    """Mean ± half its interval, to the second significant digit of the ±."""
     unit = bench_unit(one.unit)
     mean, half = interval(one) if isinstance(one, Derived) else (one.value, 0.5 * (one.high - one.low))
     mean, half = unit.of(mean), unit.of(half)
@@ -220,7 +220,7 @@ def _parameters(result: LabResult) -> Section:
 
 
 def _with_errors(one: Derived) -> tuple[str, ...]:
-    """What the errors that the readings declare add to a mean."""
+    """What the declared errors of the readings add to a mean."""
     assert one.reading is not None
     unit, u = bench_unit(one.unit), one.reading
     found = [number(unit.of(x), 2) for x in (one.summary.standard_error, u.standard, u.combined)]
@@ -229,7 +229,7 @@ def _with_errors(one: Derived) -> tuple[str, ...]:
 
 
 def _curves(found: BenchResult) -> Iterator[Figure]:
-    """Force over displacement, or the cumulative curve of a sieving, with what was fitted to it."""
+    """Force over displacement, or the cumulative curve of a sieving, with the fit."""
     for k, (title, spec) in enumerate(curve_charts(found.result).items(), start=1):
         curves = [one for one in found.result.curves if curve_title(one) == title]
         points = sum(len(one.force) for one in curves)
@@ -257,7 +257,7 @@ def _replicates(result: LabResult) -> Iterator[Figure]:
 
 
 def _inputs(found: Readings) -> Iterator[Block]:
-    """The file, and a row for each reading, or for each replicate of a curve, with the ± that it declares."""
+    """The file, and a row for each reading, or for each replicate of a curve, with its declared ±."""
     yield Facts((("File", found.file), ("SHA-256", found.sha256)))
     layout = TESTS[found.test].layout
     present = {stem for row in found.rows for stem in row.values}
@@ -297,7 +297,7 @@ def _cell(column: Column, row: Reading) -> str:
 
 
 def _in_sheet_unit(column: Column, value: float) -> float:
-    """SI → the unit of the test's template, without the dust of the conversion."""
+    """Convert SI to the unit of the test's template, without rounding residue."""
     return float(f"{value / column.factor(column.sheet_name):.12g}")
 
 

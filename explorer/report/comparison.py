@@ -1,4 +1,4 @@
-"""Two studies side by side: what was asked, what each found, and the effects of the factors that either has."""
+"""Two studies side by side: what was asked, what each found, and the effects of the factors of either."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ EFFECTS_SHOWN = 12
 
 
 def comparison(one: StudyResult, other: StudyResult, names: tuple[str, str]) -> tuple[Table, Table, Table]:
-    """Tables of findings, of what the target says of each factor, and of effects with 95 % intervals."""
+    """Tables of findings, of what the target says about each factor, and of effects with 95 % intervals."""
     return _findings(one, other, names), _optima(one, other, names), _effects(one, other, names)
 
 
@@ -46,7 +46,7 @@ def _findings(one: StudyResult, other: StudyResult, names: tuple[str, str]) -> T
 
 
 def _of_target(result: StudyResult, observable: str) -> dict[str, str]:
-    """Title → what ``result`` says of its target ``observable``; nothing where it has no such target."""
+    """Title → what ``result`` says about its target ``observable``; empty if it has no such target."""
     order = [target.observable for target in result.study.targets]
     if observable not in order:
         return {}

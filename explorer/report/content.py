@@ -1,6 +1,6 @@
-"""What a report consists of. It is built once from a typed result; HTML, Markdown and the files beside it render it.
+"""The parts of a report. It is built once from a typed result; HTML, Markdown and the files beside it render it.
 
-Text may hold code spans between backticks; everything else in it is plain and is escaped by the renderers.
+Text may hold code spans between backticks; everything else in it is plain, and the renderers escape it.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from typing import Any
 from doe.provenance import About
 
 Spec = dict[str, Any]
-"""A chart as plotly reads it: {"data": [traces], "layout": {…}}, plain JSON types."""
+"""A chart in plotly's form: {"data": [traces], "layout": {…}}, plain JSON types."""
 
 
 class Word(StrEnum):
-    """The verdicts of all reports. One of them, and nothing before it, begins every report."""
+    """The verdicts of all reports. Every report begins with one of them."""
 
     CALIBRATED = "CALIBRATED WITHIN"
     NOT_CALIBRATED = "NOT CALIBRATED"
@@ -36,7 +36,7 @@ class Word(StrEnum):
 
     @property
     def tone(self) -> str:
-        """ "good", "bad" or "open": the colour of the banner, which never says more than the word."""
+        """ "good", "bad" or "open": the colour of the banner, which says no more than the word."""
         if self in (Word.NOT_CALIBRATED, Word.OUT_OF_REACH, Word.UNEXPLAINED, Word.DIFFERS, Word.REFUSED):
             return "bad"
         return "open" if self in (Word.NO_ANSWER, Word.NO_EFFECT) else "good"
@@ -44,7 +44,7 @@ class Word(StrEnum):
 
 @dataclass(frozen=True)
 class Banner:
-    """The verdict: its word with what belongs to it ("± 1.50°"), why in one sentence, what to do next in one."""
+    """The verdict: its word with an addition ("± 1.50°"), one sentence on why, and one on what to do next."""
 
     word: Word
     of: str
@@ -53,7 +53,7 @@ class Banner:
 
     @property
     def headline(self) -> str:
-        """Word and what belongs to it."""
+        """The word with its addition."""
         return f"{self.word} {self.of}".strip()
 
 
@@ -64,7 +64,7 @@ class Strong(str):
 
 
 class Struck(str):
-    """A cell whose number does not hold: it is struck out."""
+    """A cell whose number is not valid: it is struck out."""
 
     __slots__ = ()
 
@@ -78,14 +78,14 @@ class Text:
 
 @dataclass(frozen=True)
 class Caution:
-    """A sentence without which a reader could take a number for more than it is."""
+    """A sentence that keeps the reader from overrating a number."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Facts:
-    """Pairs of (what, value), read at a glance."""
+    """Pairs of (what, value), to be read at a glance."""
 
     pairs: tuple[tuple[str, str], ...]
 
@@ -115,7 +115,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A chart. ``name`` is its id on the page, ``caption`` says what is drawn, n and method; Markdown leaves it out."""
+    """A chart. ``name`` is its id on the page, ``caption`` gives what is drawn, n and method; Markdown omits it."""
 
     name: str
     spec: Spec
@@ -124,7 +124,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A line drawing: ``svg`` is a whole element of this program's own making, ``alt`` what it shows in words."""
+    """A line drawing: ``svg`` is a complete element made by this program, ``alt`` says in words what it shows."""
 
     name: str
     svg: str
@@ -144,7 +144,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Folded:
-    """Blocks that a reader opens when wanted."""
+    """Blocks that the reader can unfold."""
 
     title: str
     blocks: tuple[Block, ...]
@@ -157,7 +157,7 @@ Shown = Figure | Drawing | Picture
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and what stands under it."""
+    """A heading and the blocks under it."""
 
     title: str
     blocks: tuple[Block, ...]
@@ -165,7 +165,7 @@ class Section:
 
 @dataclass(frozen=True)
 class DataTable:
-    """A table of plain data, written as ``NAME.csv``: numbers in SI or in the unit that their column names."""
+    """A table of plain data, written as ``NAME.csv``; numbers are in SI or in the unit in the column's name."""
 
     name: str
     header: tuple[str, ...]
@@ -183,7 +183,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Report:
-    """All of a report; ``about``: who, when, and notes."""
+    """A complete report; ``about``: who, when, and notes."""
 
     title: str
     subtitle: str
@@ -200,7 +200,7 @@ class Report:
 
 
 def shown_in(blocks: Iterable[Block]) -> Iterator[Shown]:
-    """What of ``blocks`` is numbered, in their order, folded ones included."""
+    """The numbered ones among ``blocks``, in order, folded ones included."""
     for block in blocks:
         if isinstance(block, Folded):
             yield from shown_in(block.blocks)

@@ -14,12 +14,12 @@ from explorer.report.content import DataTable
 from explorer.report.set_up import is_assumed
 from explorer.units import parameter_units
 
-if TYPE_CHECKING:  # both draw on this package themselves
+if TYPE_CHECKING:  # both import this package themselves
     from explorer.design.result import DesignResult
     from explorer.diagnosis.result import DiagnosisResult
 
 SETTING = ("numerics", "contact", "insertion")
-"""Parameters of the calculation: nobody measures them."""
+"""Parameters of the calculation, which cannot be measured."""
 
 
 def study_data(result: StudyResult) -> tuple[DataTable, ...]:
@@ -104,7 +104,7 @@ def _study_runs(result: StudyResult) -> DataTable:
 
 
 def _parameters(result: StudyResult) -> DataTable:
-    """Every parameter at its reference value, and those of the surface as the target leaves them (SI)."""
+    """Every parameter at its reference value, and those of the surface within what the target allows (SI)."""
     units, guesses, single = parameter_units(), is_assumed(result.study.assumed), result.optimum.single
     source = Path(result.study.file).name
     place = {factor.path: k for k, factor in enumerate(result.optimum.factors)}

@@ -24,15 +24,15 @@ from explorer.report.html import page
 from explorer.report.markdown import document
 
 NO_FIGURES = "figures/ for print: pip install 'repose-explorer[paper]', then `explorer report` on this folder"
-"""Said where matplotlib is not installed."""
+"""Message if matplotlib is not installed."""
 MANIFEST = "data/manifest.json"
 
 
 def write_report(report: Report, folder: Path, results: Mapping[str, str] | None = None) -> str:
     """Write all files of ``report`` into ``folder``; each appears complete or not at all.
 
-    ``results``: name → text of files that the report is about, written and counted with it. Returns a line for the
-    user about what is missing, "" where nothing is.
+    ``results``: name → text of files that the report is about, written with it and listed in its manifest. Returns a
+    line for the user about what is missing, "" if nothing is.
     """
     files = {"report.html": page(report).encode(), "report.md": document(report).encode()}
     files |= {name: text.encode() for name, text in (results or {}).items()}
@@ -51,7 +51,7 @@ def write_report(report: Report, folder: Path, results: Mapping[str, str] | None
 
 
 def manifest(report: Report, files: Mapping[str, bytes]) -> dict[str, object]:
-    """What the folder holds, of whom and by which program, with checksums."""
+    """What the folder holds, by whom and from which program, with checksums."""
     return {
         "title": report.title,
         "verdict": report.banner.headline if report.banner else "",
@@ -86,12 +86,12 @@ def _figures(report: Report, can_print: bool) -> dict[str, bytes]:
     for k, (name, one) in enumerate(report.shown.items(), start=1):
         stem = f"figures/figure_{k:02d}_{name}"
         if isinstance(one, Drawing):
-            # On the page the element needs no namespace; a file of its own does.
+            # On the page the element needs no namespace; in a file of its own it does.
             found[f"{stem}.svg"] = one.svg.replace("<svg", '<svg xmlns="http://www.w3.org/2000/svg"', 1).encode()
         elif isinstance(one, Picture):
             found[f"{stem}.png"] = one.png
         elif can_print:
-            # Half a second to import, and only for those who write a report.
+            # Takes half a second to import, so it is imported only to write a report.
             from explorer.report.printed import figure_data, printed
 
             found[f"{stem}.csv"] = csv_text(figure_data(name, one.spec)).encode()

@@ -1,6 +1,6 @@
-"""A report as one HTML page that needs nothing else: its charts' plotly.js stands in it, and no request leaves it.
+"""A report as one self-contained HTML page: it includes plotly.js for its charts, and no request leaves it.
 
-The pages of all reports are made by the same templates (``templates/``), with every text escaped. They are calm,
+The same templates (``templates/``) make the pages of all reports, with every text escaped. The pages are calm and
 readable, light or dark as the reader's system is, and have a print style.
 """
 
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
-"""Content security policy: what would load something from elsewhere is refused by the browser."""
+"""Content security policy: the browser refuses to load anything from elsewhere."""
 NUMBER = re.compile(r"^(± )?[−+<>]?\d[\d.e−+]*( ?(°|%|σ|mm|1/mm|cm²|cm³|MPa|g|s|min|g/s|m/s|kg/m³))?( ± [\d.]+°?)?$")
 LONGEST_LINE = 60
-"""Characters of a table's cell beyond which its column is broken into lines."""
+"""Characters in a table's cell above which its column is broken into lines."""
 MOST_NAMED = 6
-"""Traces that the words for a chart name."""
+"""Traces named at most in the text that describes a chart."""
 
 
 def page(report: Report) -> str:
@@ -59,7 +59,7 @@ def packed_plotly() -> str:
 
 
 def escaped(text: str) -> Markup:
-    """Text safe inside HTML; what stands between backticks becomes code, and a unit stays with its number."""
+    """Text safe inside HTML; text between backticks becomes code, and a unit stays with its number."""
     unbroken = re.sub(r"(?<=\d) (?=[%°]|[mMkg]?[mgs]\b|cm[²³]|1/mm|MPa\b|kg/)", "\u00a0", text)
     found = re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(unbroken, quote=True))
     if isinstance(text, Strong):
@@ -79,7 +79,7 @@ def embedded(spec: Spec) -> Markup:
 
 
 def alt(figure: Figure) -> str:
-    """A chart in words, for those who do not see it: its axes and what is drawn in them."""
+    """A chart in words, for readers who cannot see it: its axes and what is drawn in them."""
     traces = [html.unescape(str(trace["name"])) for trace in figure.spec["data"] if trace.get("name")]
     named = list(dict.fromkeys(traces))[:MOST_NAMED]
     return f"Chart. {axes_text(figure.spec)}{' Drawn: ' + ', '.join(named) + '.' if named else ''}".strip()
@@ -98,18 +98,18 @@ def axes_text(spec: Spec) -> str:
 
 
 def _title(axis: Mapping[str, Any]) -> str:
-    """Title of an axis; of one without, what stands along it."""
+    """Title of an axis; without one, what stands along it."""
     text: str = axis.get("title", {}).get("text", "")
     return text or " and ".join(axis.get("ticktext", ()))
 
 
 def captioned(one: Shown) -> str:
-    """The caption below a figure; of a chart with its axes."""
+    """The caption below a figure; for a chart, with its axes."""
     return f"{axes_text(one.spec)} {one.caption}".strip() if isinstance(one, Figure) else one.caption
 
 
 def column_classes(table: Table) -> list[str]:
-    """Of every column: "number" is set to the right, "sentence" is broken into lines."""
+    """Class of every column: "number" is aligned right, "sentence" is broken into lines."""
     found = []
     for column in zip(*table.rows, strict=True):
         is_number = all(cell == MISSING or NUMBER.match(cell) for cell in column)
@@ -118,19 +118,19 @@ def column_classes(table: Table) -> list[str]:
 
 
 def data_uri(picture: Picture) -> str:
-    """A picture inside the page."""
+    """A picture as a ``data:`` address, inside the page."""
     return f"data:image/png;base64,{base64.b64encode(picture.png).decode()}"
 
 
 def drawn(drawing: Drawing) -> Markup:
-    """The element itself: it is made by this program, with its own texts escaped."""
+    """The element itself, as this program made it with its texts escaped."""
     return Markup(drawing.svg)
 
 
 @cache
 def templates() -> Environment:
     """The templates with their filters."""
-    # Imported here: the page draws reports' charts without ever making one.
+    # Imported here: the live page draws charts of reports without ever making a report.
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     made = Environment(

@@ -1,8 +1,8 @@
-"""What a target says of each factor: its value where the target identifies it, else the range that gives the target.
+"""What a target says about each factor: its value if the target identifies it, else the range that gives the target.
 
-The optimum is one point that a rule picks among all settings that give the target. Its 95 % set tells how far that pick
-scatters from refit to refit; it tells what is known of a factor only where the target identifies the factor. Of several
-targets the joint posterior says both: the 95 % interval of each factor, and whether that leaves it open.
+The optimum is one point that a rule picks among all settings that give the target. Its 95 % set shows how far that pick
+scatters from refit to refit; it shows what is known about a factor only if the target identifies the factor. For
+several targets, the joint posterior gives both: the 95 % interval of each factor, and whether that leaves it open.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from explorer.units import MISSING, enumeration, parameter_label, parameter_rang
 
 BY_RULE = "chosen by rule"
 GIVES_TARGET = "range that gives the target"
-"""What `Setting.feasible` is called in tables and charts."""
+"""Name of `Setting.feasible` in tables and charts."""
 
 
 @dataclass(frozen=True)
 class FactorSetting:
     """One factor at the optimum, in words.
 
-    ``chosen``: the value. ``confidence_set``: its 95 % set, a dash where the factor is not identified. ``feasible``:
+    ``chosen``: the value. ``confidence_set``: its 95 % set, a dash if the factor is not identified. ``feasible``:
     the range over which the model gives the target (several targets: the 95 % interval of their posterior),
     ``feasible_share``: the part of the region that it takes.
     """
@@ -38,7 +38,7 @@ class FactorSetting:
 
     @property
     def value(self) -> str:
-        """The chosen value, called what it is."""
+        """The chosen value, with the word for what it is."""
         return self.chosen if self.identified else f"{self.chosen} ({BY_RULE})"
 
     @property
@@ -52,12 +52,12 @@ class FactorSetting:
 
     @property
     def range_or_answer(self) -> str:
-        """The range that gives the target; where the factor is not identified it is the answer, and stands out."""
+        """The range that gives the target; if the factor is not identified, it is the answer and stands out."""
         return self.feasible if self.identified or self.feasible == MISSING else Strong(self.feasible)
 
     @property
     def answer(self) -> str:
-        """The value with its 95 % set; of a factor that is not identified the range first."""
+        """The value with its 95 % set; for a factor that is not identified, the range first."""
         if self.identified:
             return f"{self.chosen} ({self.confidence_set})"
         return self.value if self.feasible == MISSING else f"{self.feasible} ({BY_RULE}: {self.chosen})"
@@ -74,7 +74,7 @@ def all_identified(optimum: OptimumResult) -> bool:
 
 
 def rule(optimum: OptimumResult, reference: str) -> str:
-    """How the point was chosen, as a sentence for below a table; empty where every factor is identified."""
+    """How the point was chosen, as a sentence to go below a table; empty if every factor is identified."""
     if all_identified(optimum):
         return ""
     if optimum.compromise is not None:
@@ -87,7 +87,7 @@ def rule(optimum: OptimumResult, reference: str) -> str:
 
 
 def cloud_caution(optimum: OptimumResult) -> str:
-    """What the scatter of the refits does not tell, as a sentence; empty where one target identifies every factor."""
+    """What the scatter of the refits does not show, as a sentence; empty if one target identifies every factor."""
     if optimum.compromise is not None:
         return "The refits are of the first target alone, the star is the setting of all targets."
     open_ = [s.name for s in settings(optimum) if not s.identified]

@@ -1,4 +1,4 @@
-"""Sections as Markdown: the same facts and tables without the charts, fit for an issue."""
+"""Sections as Markdown: the same facts and tables without the charts, suitable for an issue."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from explorer.report.content import (
 )
 
 SPECIAL = re.compile(r"([\\*_\[\]<>#|~$]|&(?=#?\w+;))")
-"""What makes emphasis, links, elements, headings, cells, struck or mathematical text, and characters by name."""
+"""Characters that make emphasis, links, elements, headings, cells, struck or mathematical text, or entities."""
 
 
 def document(report: Report) -> str:
@@ -42,7 +42,7 @@ def document(report: Report) -> str:
 
 
 def escaped(text: str) -> str:
-    """Text in which Markdown and HTML see no markup; code spans stay, and line breaks become blanks."""
+    """Text in which Markdown and HTML see no markup; code spans stay, and line breaks become spaces."""
     pieces = re.split(r"(`[^`]+`)", text.replace("\n", " "))
     plain = "".join(
         piece.replace("|", r"\|") if piece.startswith("`") and len(piece) > 1 else SPECIAL.sub(r"\\\1", piece)

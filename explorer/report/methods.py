@@ -1,6 +1,6 @@
 """Methods for a paper: a paragraph written from the run's own data, and the sources that it cites.
 
-Every number in it is one of the result; a source is cited where the text names it (`explorer.report.sources`).
+Every number in it comes from the result; a source is cited where the text names it (`explorer.report.sources`).
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from explorer.photograph.result import PhotographResult
 
 Methods = tuple[Section, tuple[Reference, ...]]
-"""The section, and its sources as entries."""
+"""The section, and its sources as bibliography entries."""
 LAWS = {
     HertzMindlin.name: ("hertz1882", "mindlin1953", "thornton2013"),
     LinearSpringDashpot.name: ("cundall1979", "schwager2007"),
@@ -64,7 +64,7 @@ DESIGNS = {
     "Morris": ("morris1991",),
 }
 WITHOUT_SOLVER = ("taichi",)
-"""Programs of a result that nothing was simulated for."""
+"""Programs left out of a result without simulations."""
 
 
 def study_methods(result: StudyResult) -> Methods:
@@ -74,13 +74,13 @@ def study_methods(result: StudyResult) -> Methods:
 
 
 def diagnosis_references(result: DiagnosisResult) -> tuple[Reference, ...]:
-    """What the methods of a diagnosis rest on."""
+    """Sources of the methods of a diagnosis."""
     keys = ("efron1973", "schaefer2005", *(("box1967",) if result.next_experiment else ()))
     return (*(SOURCES[key] for key in keys), *software(result.versions))
 
 
 def bench_methods(result: LabResult, versions: Mapping[str, str | None]) -> Methods:
-    """The paragraph of a bench test: its standard, every formula with n, and how replicates were summed up."""
+    """The paragraph of a bench test: its standard, every formula with n, and how replicates were summarised."""
     found = [one for one in result.derived if one.name not in CONDITIONS]
     formulas: dict[tuple[str, str], list[str]] = {}
     for one in found:
@@ -118,7 +118,7 @@ def bench_methods(result: LabResult, versions: Mapping[str, str | None]) -> Meth
 
 
 def photograph_methods(result: PhotographResult) -> Methods:
-    """The paragraph of photographed piles: how the angle was read, from which base line, on which scale."""
+    """The paragraph of photographed piles: how the angle was read, with which base line and scale."""
     lines = enumeration(list(dict.fromkeys(pile.base_from for pile in result.piles if pile.base_from)))
     n, lost = len(result.piles), len(result.refused)
     text = (
@@ -174,7 +174,7 @@ def design_methods(result: DesignResult) -> Methods:
 
 
 def _other_models(found: DesignAnalysis) -> str:
-    """What stands for the polynomial, or beside it."""
+    """What is used instead of the polynomial, or beside it."""
     text = ""
     if found.elementary is not None:
         text += (
@@ -198,14 +198,14 @@ def _other_models(found: DesignAnalysis) -> str:
 
 
 def _explained(r_squared: float, predicted: float) -> str:
-    """Of a response that never changes there is none, and none is predicted where a run is fitted exactly."""
+    """R² and predicted R²: a constant response has neither; if a run is fitted exactly, there is no predicted one."""
     if not math.isfinite(r_squared):
         return "Nothing varies that a model could explain."
     return f"R² is {fixed(r_squared, 4)}{f', predicted {fixed(predicted, 4)}' if math.isfinite(predicted) else ''}."
 
 
 def plan_methods(result: PlanResult) -> Methods:
-    """The paragraph of a planned experiment: family, size, order of the runs, and what it will see."""
+    """The paragraph of a planned experiment: family, size, order of the runs, and what it can detect."""
     family = _family(result.design)
     text = (
         f"{_article(family).capitalize()} {family} design{citations(DESIGNS.get(family, ()))} of {len(result.coded)} "
@@ -226,7 +226,7 @@ def plan_methods(result: PlanResult) -> Methods:
 
 
 def audit_methods(audit: Audit, what: str, versions: Mapping[str, str | None]) -> Methods:
-    """The paragraph of an audit: of what, by which checks, and how it grades."""
+    """The paragraph of an audit: its object, its checks, and how it grades."""
     source = audit.source or "no source stated"
     checks = list(dict.fromkeys(figure.check for figure in audit.figures))
     text = (
@@ -241,7 +241,7 @@ def _without_solver(versions: Mapping[str, str | None]) -> dict[str, str | None]
 
 
 def _family(design: str) -> str:
-    """What a sentence calls a design, "" where a sheet does not say."""
+    """Name of a design in a sentence; "" if the sheet does not say."""
     return FAMILIES[design].title if design in FAMILIES else design
 
 
@@ -320,7 +320,7 @@ def _designs(result: StudyResult) -> str:
 
 
 def _read(screening: str, targets: Sequence[Target]) -> str:
-    """What the pours were read by: the screening may take another estimator of the first target."""
+    """How the pours were read: the screening may use another estimator of the first target."""
     first, *others = (observable_label(target.observable) for target in targets)
     if screening == targets[0].observable:
         return f"All of them were read by the {enumeration([first, *others])}."

@@ -1,4 +1,4 @@
-"""The report of photographed piles: each picture with what was read off it, the angles, and the outlines."""
+"""The report of photographed piles: each picture with its readings, the angles, and the outlines."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ from explorer.units import MISSING, fixed, number
 from solver.photograph import open_picture
 
 MOST_BYTES = 1_500_000
-"""Of a picture, so that the page stays below 5 MB with the library of its charts and the letters of base64."""
+"""Size of a picture, so that the page stays below 5 MB with its chart library and the overhead of base64."""
 COLOURS = (FACTOR, ASSUMPTION, TARGET, CHOSEN)
 READ = "read"
-"""Name of the picture with what was read."""
+"""Name of the picture with the readings."""
 
 
 def read_picture(order: MeasureOrder, measured: MeasuredPhotographs) -> bytes:
-    """The pictures with what was read, as PNG of at most ``MOST_BYTES``."""
+    """The pictures with the readings drawn in, as one PNG of at most ``MOST_BYTES``."""
     pictures = [open_picture(path) for path in order.pictures]
     return png_within(MOST_BYTES, sheet(pictures, measured.readings, measured.simulated, thirds=True))
 
 
 def png_within(most: int, picture: Image.Image) -> bytes:
-    """A picture as PNG of at most ``most`` bytes, made smaller until it is."""
+    """A picture as PNG of at most ``most`` bytes, scaled down until it fits."""
     while len(found := _png(picture)) > most:
         size = round(0.8 * picture.width), round(0.8 * picture.height)
         picture = picture.resize(size, Image.Resampling.LANCZOS)
@@ -57,7 +57,7 @@ def _png(picture: Image.Image) -> bytes:
 
 
 def photograph_report(result: PhotographResult, picture: bytes | None) -> Report:
-    """The report; ``picture`` is what :func:`read_picture` gave, None where it is lost."""
+    """The report; ``picture`` is the result of :func:`read_picture`, None if it is lost."""
     names = ", ".join([*(pile.name for pile in result.piles), *result.refused])
     blocks: list[Block] = [_angles(result)] if result.piles else []
     if picture is not None:
@@ -117,7 +117,7 @@ def _counted(result: PhotographResult) -> str:
 
 
 def _drawn(result: PhotographResult) -> str:
-    """What the lines on the pictures are."""
+    """What the lines on the pictures mean."""
     if not result.piles:
         return "None was read, and nothing is drawn."
     lines = "White: outline; orange: flank lines (least squares); green: their thirds; blue: base line."
@@ -154,7 +154,7 @@ def banner(result: PhotographResult) -> Banner:
 
 
 def outlines(result: PhotographResult) -> Spec:
-    """The outlines over each other on one scale."""
+    """The outlines superimposed on one scale."""
     in_metres = all(pile.unit == "m" for pile in result.piles)
     factor, unit = (1e3, "mm") if in_metres else (1.0, "px")
     traces = [
@@ -241,7 +241,7 @@ def _inputs(result: PhotographResult) -> Table:
 
 
 def _parts(result: PhotographResult) -> Table:
-    """What the ± of the mean is made of."""
+    """Contributions to the ± of the mean."""
     names = list(dict.fromkeys(name for pile in result.piles for name in pile.parts))
     rows = tuple(
         (pile.name, *(fixed(pile.parts.get(name), 3) for name in names)) for pile in result.piles if pile.parts

@@ -1,8 +1,8 @@
 """A chart's plotly specification drawn for print by matplotlib: SVG and PDF, 85 and 180 mm wide, 8 pt.
 
-One translator for the trace types that this program's charts are made of (scatter, bar, contour, heatmap), so a figure
-on paper cannot say anything else than the one on the page. What stands in space is drawn in the plane: a surface as
-contours, the settings that give a target as one line for each of several values of the third factor.
+One translator serves the trace types of this program's charts (scatter, bar, contour, heatmap), so a figure on paper
+shows the same as the one on the page. Charts in space are drawn in the plane: a surface as contours, the settings that
+give a target as one line for each of several values of the third factor.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ WIDTHS = (85, 180)
 PAGE_PX = 1060.0
 """Width of a chart on the page, against which its height is given [px]."""
 PX = 0.5
-"""Points on paper of one pixel on the page, for marks and lines."""
+"""Points on paper per pixel on the page, for marks and lines."""
 NAME_ROOM = np.array([0.12, 0.05])
-"""Share of a panel that a name beside a mark needs."""
+"""Share of a panel needed by a name beside a mark."""
 LEAST, MOST_HEIGHT = 35.0, 230.0
-"""Heights of a figure [mm]."""
+"""Limits of the height of a figure [mm]."""
 LETTER, SMALL_LETTER = 1.45, 1.3
 """Width of a letter of 8 and of 7 pt [mm]."""
 LEVELS = 5
-"""Lines of the settings in space that give a target."""
+"""Number of lines for the settings in space that give a target."""
 STYLE = {
     "font.size": 8.0,
     "axes.titlesize": 8.0,
@@ -71,7 +71,7 @@ def printed(spec: Spec) -> dict[str, bytes]:
     for width in WIDTHS:
         figure = drawn(spec, width)
         figure.draw_without_rendering()
-        figure.set_layout_engine("none")  # as it was laid out, for both files
+        figure.set_layout_engine("none")  # keep the layout for both files
         for kind, stamp in (("svg", {"Date": None}), ("pdf", {"CreationDate": None})):
             file = io.BytesIO()
             with mpl.rc_context(STYLE):
@@ -185,7 +185,7 @@ def _lines_in_space(trace: Json, title: str) -> list[Json]:
 
 
 def _narrow(spec: Spec) -> Spec:
-    """For one column: panels in a row become one below the other, names of rows are cut."""
+    """For one column: panels in a row go below each other, and names of rows are cut."""
     layout = spec["layout"]
     if any(isinstance(value, str) for trace in spec["data"] for value in trace.get("y", ())[:1]):
         spec = short_rows(spec)
@@ -210,7 +210,7 @@ Panels = dict[tuple[str, str], Panel]
 
 
 def _panels(figure: Figure, spec: Spec) -> Panels:
-    """Axes by the names of their x and y axes, on a grid as the domains of the layout have them."""
+    """Axes by the names of their x and y axes, on a grid given by the domains of the layout."""
     layout = spec["layout"]
     pairs = list(dict.fromkeys((trace.get("xaxis", "x"), trace.get("yaxis", "y")) for trace in spec["data"]))
     sides = [(_axis(layout, x), _axis(layout, y)) for x, y in pairs]
@@ -245,7 +245,7 @@ def _place(panels: Panels, one: Json) -> Axes:
 
 
 def _finish(axes: Axes, x: Json, y: Json, size: tuple[float, float]) -> None:
-    """Titles, ticks and limits; ``size``: width and height that all panels have together [mm]."""
+    """Set titles, ticks and limits; ``size``: width and height of all panels together [mm]."""
     letters = {
         letter: max(12, int((one.get("domain", (0.0, 1.0))[1] - one.get("domain", (0.0, 1.0))[0]) * room / LETTER) - 3)
         for letter, one, room in (("x", x, size[0]), ("y", y, size[1]))
@@ -283,7 +283,7 @@ def _finish(axes: Axes, x: Json, y: Json, size: tuple[float, float]) -> None:
 
 
 def _row_names(axes: Axes, y: Json) -> list[str]:
-    """Names along the y axis as they will stand there."""
+    """Names along the y axis as they will be printed."""
     names = getattr(axes.yaxis, "names", [])
     shown = (
         dict(zip(map(plain, y.get("tickvals", ())), map(plain, y.get("ticktext", ())), strict=False)) if names else {}
@@ -292,7 +292,7 @@ def _row_names(axes: Axes, y: Json) -> list[str]:
 
 
 def _broken(text: str, most: int = 34) -> str:
-    """A long title of an upright axis, in lines."""
+    """A long title of a vertical axis, broken into lines."""
     lines = [""]
     for word in text.split(" "):
         lines = [*lines, word] if len(lines[-1]) + len(word) > most else [*lines[:-1], f"{lines[-1]} {word}".strip()]
@@ -312,7 +312,7 @@ def _draw(axes: Axes, trace: Json, spec: Spec, sides: tuple[Json, Json], number:
         case "contour":
             _contour(axes, trace, spec, order)
         case "heatmap":
-            # A scale of its own runs over its own values.
+            # A colour scale of its own covers its own values.
             own = {"colorscale": trace.get("colorscale"), "cmin": 0.0, "cmax": float(np.max(trace["z"]))}
             scale = own if own["colorscale"] else spec["layout"]["coloraxis"]
             axes.pcolormesh(
@@ -324,7 +324,7 @@ def _draw(axes: Axes, trace: Json, spec: Spec, sides: tuple[Json, Json], number:
 
 
 def _values(axes: Axes, values: Sequence[Any], letter: str, layout: Json) -> Any:
-    """Numbers with gaps as NaN; names as places along the axis, where the layout or their order puts them."""
+    """Numbers with NaN for gaps; names as positions along the axis, from the layout or their order."""
     names = [value for value in values if isinstance(value, str)]
     if not names:
         return np.array([math.nan if value is None else value for value in values], dtype=float)
@@ -359,14 +359,14 @@ def _scatter(axes: Axes, trace: Json, sides: tuple[Json, Json], order: float, on
             linestyle=DASHES[stroke.get("dash", "solid")], solid_capstyle="butt", zorder=order - 0.5,
         )  # fmt: skip
     if "markers" in mode:
-        # On a map the marks at its edge are whole.
+        # On a map, marks at the edge are not clipped.
         axes.scatter(x, y, s=_area(marker), zorder=order, clip_on=not on_map, **_mark(marker, colour, opacity))
     if "text" in mode:
         _names(axes, x, y, trace["text"])
 
 
 def _names(axes: Axes, x: Array, y: Array, names: Sequence[str]) -> None:
-    """Names beside marks, the highest first; one that would lie on another is left out."""
+    """Write names beside marks, the highest first; one that would overlap another is left out."""
     reach = np.ptp(axes.dataLim.get_points(), axis=0) * NAME_ROOM
     shown: list[Array] = []
     for k in np.argsort(-y):
@@ -417,7 +417,7 @@ def _contour(axes: Axes, trace: Json, spec: Spec, order: float) -> None:
     how, stroke = trace["contours"], trace.get("line", {})
     width = max(0.4, stroke.get("width", 1.0) * PX)
     if how.get("type") == "constraint":
-        # As plotly does, where z > value, all that our charts ask for, does not hold.
+        # As in plotly, shade where z > value, the only operation in our charts, does not hold.
         if np.nanmin(z) < how["value"]:
             levels = [float(np.nanmin(z)) - 1.0, how["value"]]
             axes.contourf(x, y, z, levels, colors=[_rgba(trace["fillcolor"])], zorder=0.3)
@@ -475,7 +475,7 @@ def _shape(axes: Axes, shape: Json) -> None:
     limits = axes.get_xlim(), axes.get_ylim()
     if shape["type"] == "rect":
         size = shape["x1"] - shape["x0"], shape["y1"] - shape["y0"]
-        # A band as faint as on the screen would be lost on paper.
+        # A band as faint as on the screen would be invisible on paper.
         red, green, blue, alpha = _rgba(shape["fillcolor"])
         face = red, green, blue, max(0.16, alpha)
         axes.add_patch(
@@ -491,7 +491,7 @@ def _shape(axes: Axes, shape: Json) -> None:
 
 
 def _make_room(axes: Axes, shape: Json, limits: tuple[tuple[float, float], tuple[float, float]]) -> None:
-    """A line or a band that lies outside the data is still within the axes."""
+    """Extend the axes to include a line or band outside the data."""
     for letter, (low, high), put in zip("xy", limits, (axes.set_xlim, axes.set_ylim), strict=True):
         if not shape[f"{letter}ref"].endswith("domain"):
             ends = shape[f"{letter}0"], shape[f"{letter}1"]
@@ -537,7 +537,7 @@ def _legend(figure: Figure, spec: Spec, width: float) -> None:
         shown[name] = _key(trace)
     if len(shown) < 2:
         return
-    # Columns as the longest name has room for, at some 1.5 mm a letter.
+    # As many columns as leave room for the longest name, at some 1.5 mm a letter.
     columns = max(1, min(len(shown), int(width // (12.0 + 1.35 * max(map(len, shown))))))
     figure.legend(
         list(shown.values()), list(shown), loc="outside upper left", ncols=columns, frameon=False, handlelength=1.6,
@@ -546,7 +546,7 @@ def _legend(figure: Figure, spec: Spec, width: float) -> None:
 
 
 def _key(trace: Json) -> Any:
-    """What stands before a name in the legend."""
+    """The symbol before a name in the legend."""
     marker, stroke = trace.get("marker", {}), trace.get("line", {})
     if trace["type"] == "bar":
         colour = marker["color"]

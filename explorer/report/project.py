@@ -1,9 +1,9 @@
-"""One report of finished folders: the audit of a published study, and a material's photographs, bench tests, planned
+"""One report from finished folders: the audit of a published study, and a material's photographs, bench tests, planned
 and analysed designs, calibration and diagnosis.
 
-A folder says by its result file what it is; its report is built anew from that file, so one of an older version of the
-program gets today's figures as well. Several are joined: the verdict of the last stage first, those of all in a table,
-then every report in the order of the work.
+The result file of a folder shows its kind. The report is rebuilt from that file, so the result of an older version of
+the program also gets today's figures. Several reports are joined: the verdict of the last stage first, the verdicts of
+all in a table, then every report in the order of the work.
 """
 
 from __future__ import annotations
@@ -96,11 +96,11 @@ KINDS: dict[str, tuple[str, Callable[[Content], bool], Callable[[Content], Any],
         lambda result, _: diagnosis_report(result),
     ),
 }
-"""Kind → file, whether its content is of this kind, how it is read, and its report; in the order of the work."""
+"""Kind → file, test whether its content is of this kind, reader, and report; in the order of the work."""
 
 
 def part_of(folder: Path) -> Part:
-    """What a folder holds; CommandError in one line where it is no finished result."""
+    """What a folder holds; raises CommandError in one line if it holds no finished result."""
     kind, content = _content(folder)
     if not kind:
         names = ", ".join(dict.fromkeys(name for name, *_ in KINDS.values()))
@@ -114,7 +114,7 @@ def part_of(folder: Path) -> Part:
 
 
 def _content(folder: Path) -> tuple[str, Content]:
-    """Kind of a folder's result, and the content of its file; "" where it holds none."""
+    """Kind of a folder's result, and the content of its file; "" if it holds none."""
     for kind, (name, fits, _, _) in KINDS.items():
         file = folder / name
         if not file.is_file():
@@ -129,7 +129,7 @@ def _content(folder: Path) -> tuple[str, Content]:
 
 
 def finished_folders(folder: Path) -> list[Path]:
-    """Folders with a result, the oldest first, of a project (`explorer.project`) in ``folder``; else itself alone."""
+    """Folders with a result, oldest first, of the project (`explorer.project`) in ``folder``; else ``folder`` alone."""
     if not (folder / FILE).is_file():
         return [folder]
     project = load_project(folder)
@@ -184,7 +184,7 @@ def project_report(folders: list[Path], title: str, about: About) -> Report:
 
 
 def _with_small_pictures(parts: list[Part]) -> list[Part]:
-    """The parts with pictures that one page can hold together."""
+    """The parts, with pictures small enough for one page."""
     n = sum(isinstance(one, Picture) for part in parts for one in part.report.shown.values())
 
     def small(block: Block) -> Block:
@@ -201,7 +201,7 @@ def _with_small_pictures(parts: list[Part]) -> list[Part]:
 
 
 def _side_by_side(parts: list[Part]) -> list[Section]:
-    """Photographed outlines over the mean silhouettes of a study, where there are both and the scale is known."""
+    """Photographed outlines over the mean silhouettes of a study, if there are both and the scale is known."""
     studies = [part.result for part in parts if isinstance(part.result, StudyResult) and part.result.piles]
     photographs = [part.result for part in parts if isinstance(part.result, PhotographResult)]
     measured = {pile.name: (pile.u, pile.z) for one in photographs for pile in one.piles if pile.unit == "m"}
@@ -213,7 +213,7 @@ def _side_by_side(parts: list[Part]) -> list[Section]:
 
 
 def _renamed(section: Section, before: str, prefix: str) -> Section:
-    """A section whose title and figures have names of their own on the joined page."""
+    """A section whose title and figure names are unique on the joined page."""
     return Section(f"{before}: {section.title}", tuple(_block(block, prefix) for block in section.blocks))
 
 

@@ -1,7 +1,7 @@
 """The set-up of a calibration: what was poured (material, pairs, bodies), and a drawing of the rig with its dimensions.
 
-All of it is read off what the result carries (`doe.provenance.SetUp`); the drawing is the rig's own surfaces cut by the
-plane y = 0, so that any rig, also one of a plug-in, is drawn as it stands before it acts.
+All of it comes from what the result holds (`doe.provenance.SetUp`). The drawing shows the rig's own surfaces cut by the
+plane y = 0, so any rig, also one of a plug-in, is drawn as it is before it moves.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ Stroke = tuple[Array, str]
 """Corners (n, 2) in the plane x–z [m], and the name of the surface."""
 
 WIDTH, MARGIN, LEAST_GAP, TICK = 560.0, 130.0, 17.0, 4.0
-"""Of the drawing, of the room for its dimensions, between two of them, and half of the stroke at their ends [px]."""
+"""Width of the drawing, margin for dimensions, gap between two of them, half the tick at their ends [px]."""
 SAME = 1e-9
-"""Lengths closer than this are one [m]."""
+"""Lengths that differ by less than this are equal [m]."""
 MOST_CORNERS = 64
 MOST_WIDTHS = 4
 MARK = " †"
-"""Behind a value that was assumed."""
+"""Mark after an assumed value."""
 NO_DENSITY = "–"
 
 
@@ -48,7 +48,7 @@ def set_up_of(scene: Scene) -> SetUp:
 
 
 def set_up(found: SetUp | None, assumed: Sequence[str], experiments: Mapping[str, SetUp]) -> Section | None:
-    """Rig of the study and of each further experiment, materials, pairs, bodies; None of before they were kept."""
+    """Rig of the study and of each further experiment, materials, pairs, bodies; None for results without them."""
     if found is None:
         return None
     blocks = _rig("Rig", found)
@@ -71,7 +71,7 @@ def _rig(words: str, found: SetUp) -> list[Block]:
 
 
 def material_tables(found: SetUp, assumed: Sequence[str]) -> list[Table]:
-    """Materials, pairs and bodies with every number that another engine needs; † marks what nobody measured."""
+    """Materials, pairs and bodies with every number that another engine needs; † marks assumed values."""
     values, guesses = found.values, is_assumed(assumed)
     used = list(dict.fromkeys([*found.materials.values(), found.wall]))
     keys = ("density", "shear_modulus", "poisson_ratio")
@@ -161,7 +161,7 @@ def rig_drawing(found: SetUp) -> Drawing | None:
 
 
 def _turned(surface: Surface, points: Array) -> Array:
-    """Points (n, 3) of a surface's own frame in the world."""
+    """Points (n, 3) in a surface's own frame, transformed to world coordinates."""
     w, *vector = surface.pose.quaternion
     v = np.array(vector)
     across = np.cross(v, points)
@@ -170,11 +170,11 @@ def _turned(surface: Surface, points: Array) -> Array:
 
 
 def _cut(surface: Surface) -> Iterator[Array]:
-    """Lines (n, 2) in which a surface meets the plane y = 0; of a plane a line that is drawn across all."""
+    """Lines (n, 2) in which a surface meets the plane y = 0; for a plane, a line across the whole drawing."""
     if isinstance(surface, Plane):
         origin, tip = _turned(surface, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
         across, up = tip[0] - origin[0], tip[2] - origin[2]
-        if math.hypot(across, up) > 0.5:  # one that faces along y is in the plane of the drawing
+        if math.hypot(across, up) > 0.5:  # a plane that faces along y is parallel to the drawing
             yield np.array([[origin[0] - up, origin[2] + across], [origin[0] + up, origin[2] - across]])
     elif isinstance(surface, Revolved):
         yield from _cut_revolved(surface)
@@ -190,7 +190,7 @@ def _cut(surface: Surface) -> Iterator[Array]:
 def _cut_revolved(one: Revolved) -> Iterator[Array]:
     axis = _turned(one, np.array([[0.0, 0.0, 1.0]]))[0] - np.array(one.pose.origin)
     if abs(axis[1]) > 0.7:
-        # It lies along y: a circle of its own radius.
+        # Its axis lies along y: a circle with its radius.
         angle = np.linspace(0.0, 2.0 * math.pi, MOST_CORNERS)
         for r, z in dict.fromkeys([(one.r0, one.z0), (one.r1, one.z1)]):
             ring = np.stack([r * np.cos(angle), r * np.sin(angle), np.full_like(angle, z)], axis=1)
@@ -214,7 +214,7 @@ def _cut_triangle(corners: Array) -> Array | None:
 
 
 def _svg(strokes: Sequence[Stroke], planes: Sequence[str], lengths: dict[str, float]) -> str:
-    """The lines with dimensions: heights between levels at the right, widths at the levels where they are."""
+    """The lines with dimensions: heights between levels on the right, widths at their own levels."""
     walls = [line for line, name in strokes if name not in planes]
     corners = np.concatenate(walls or [line for line, _ in strokes])
     grounds = [line for line, name in strokes if name in planes]
@@ -256,7 +256,7 @@ def _svg(strokes: Sequence[Stroke], planes: Sequence[str], lengths: dict[str, fl
 
 
 Mark = tuple[tuple[tuple[float, float], tuple[float, float]], tuple[float, float], str]
-"""A dimension: its two ends, the place of its words, and the words."""
+"""A dimension: its two ends, the position of its text, and the text."""
 
 
 def _heights(
@@ -278,7 +278,7 @@ def _widths(corners: Array, lengths: dict[str, float]) -> list[Mark]:
         found[round(float(z), 9)] = max(found.get(round(float(z), 9), 0.0), abs(float(x)))
     by_width = {round(r, 9): z for z, r in sorted(found.items()) if r > SAME}
     if len(by_width) > MOST_WIDTHS:
-        by_width = dict([max(by_width.items())])  # of a circle, its diameter
+        by_width = dict([max(by_width.items())])  # for a circle, its diameter
     return [(((-r, z), (r, z)), (0.0, z), _dimension(2.0 * r, lengths, "diameter")) for r, z in by_width.items()]
 
 

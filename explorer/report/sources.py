@@ -1,7 +1,7 @@
 """What the reports cite: sources by key, how they are named in a text, in a list and as entries for BibTeX.
 
-A source has a DOI here only where the code that rests on it states one. Volume and page are those that the code names;
-titles were checked against a catalogue for Rosner 1983, ASTM C136 and ASTM D6393 alone.
+A source has a DOI here only if the code that relies on it states one. Volume and page are those named in the code;
+titles were checked against a catalogue only for Rosner 1983, ASTM C136 and ASTM D6393.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def _book(key: str, author: str, title: str, year: int) -> Reference:
 
 
 def _standard(key: str, name: str, title: str) -> Reference:
-    """A source that a text calls by a name of its own, as it does a standard."""
+    """A source that a text cites by a name of its own, such as a standard."""
     return Reference(key, "misc", {"shorthand": name, "title": title, "howpublished": name})
 
 
@@ -151,14 +151,14 @@ def cited(key: str) -> str:
 
 
 def citations(keys: tuple[str, ...]) -> str:
-    """Several in brackets with a blank before them; "" of none."""
+    """Several sources in brackets, preceded by a space; "" for none."""
     return f" ({'; '.join(map(cited, keys))})" if keys else ""
 
 
 def methods_section(
     text: str, versions: Mapping[str, str | None], done: str = "Simulated and analysed"
 ) -> tuple[Section, tuple[Reference, ...]]:
-    """The section of a paragraph with what it cites as a list, and these as entries; ``done`` with which programs."""
+    """The section (a paragraph and a list of its sources), and the sources as entries; ``done`` with which programs."""
     used = tuple(one for key, one in SOURCES.items() if cited(key) in text)
     programs = software(versions)
     if programs:

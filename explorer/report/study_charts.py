@@ -1,4 +1,4 @@
-"""The charts that a study's result, or what there is of it so far, has something for: chosen by title, drawn then."""
+"""The charts for which a study's result, complete or partial, has content: chosen by title, then drawn."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from explorer.units import observable_label
 
 @dataclass(frozen=True)
 class Plot:
-    """``make`` gives the chart, ``caption`` what its marks mean, ``aspect`` its height by its width."""
+    """``make`` gives the chart, ``caption`` says what its marks mean, ``aspect`` is height over width."""
 
     make: Callable[[], Spec | None]
     caption: str
@@ -33,22 +33,22 @@ class Plot:
 
 
 Plots = dict[str, Plot]
-"""Title → plot, in the order of the list to choose from."""
+"""Title → plot, in the order of the selection list."""
 
 Named = Iterator[tuple[str, Plot]]
 FEWEST_SEEDS = 4
-"""Of the pilot, from which on its noise is drawn: the interval of σ then ends at 3.7 times it (χ², 3 degrees)."""
+"""Seeds of the pilot from which its noise is drawn: the interval of σ then ends at 3.7 times σ (χ², 3 degrees)."""
 
 
 def study_plots(result: AnyStudy) -> Plots:
-    """Title → plot of every stage that is there, in the order of the stages."""
+    """Title → plot of every stage present, in the order of the stages."""
     makers = (_pilot, _screening, _scan, _ascent, _surface, _optimum, _verification)
     return {title: plot for plots in makers for title, plot in plots(result)}
 
 
 def _pilot(result: AnyStudy) -> Named:
     pilot = result.pilot
-    # The interval of a σ over two seeds reaches up to 32 times it: no chart of that tells anything.
+    # The interval of σ over two seeds reaches up to 32 times σ: a chart of that shows nothing.
     if pilot is None or min(noise.runs for noise in pilot.noise.values()) < FEWEST_SEEDS:
         return
     caption = "Whiskers: 95 % intervals; bias: its range over the ways to fill a cone with bodies."
@@ -66,7 +66,7 @@ def _screening(result: AnyStudy) -> Named:
         caption = "Effects of pure noise lie on a line through zero; Lenth's margins, 95 %."
         yield "Half-normal", Plot(partial(half_normal, part), caption)
         yield "Main effects", Plot(partial(main_effects, part), "The largest ones; whiskers: 95 %; dotted: mean.", 1.1)
-        # The chart of all effects shows the assumptions beside them once they are there.
+        # The chart of all effects also shows the assumptions once they exist.
         caption = "Low → high, each over its own range, 95 % intervals; hollow: too few bodies to be tested."
         yield "Effects with intervals", Plot(lambda: short_rows(all_effects(part, result.assumptions)), caption, 1.6)
 
@@ -80,7 +80,7 @@ def _scan(result: AnyStudy) -> Named:
 def _ascent(result: AnyStudy) -> Named:
     if result.ascent is not None:
         caption = "Band: the target, and how far off still counts as met; dotted: what the screening predicted."
-        # A result of before there were more walks has one, whatever its targets.
+        # A result from before there were several walks has one, whatever its targets.
         for seen, target, of in zip(result.ascent.walks, result.study.targets, _of_targets(result), strict=False):
             yield f"Ascent path{of}", Plot(partial(ascent_path, result.ascent, seen, target), caption)
 
@@ -145,6 +145,6 @@ def _pareto(screening: ScreeningResult, error: ErrorSource) -> Spec:
 
 
 def _of_targets(result: AnyStudy) -> list[str]:
-    """Ends of titles: the name of every target where there are several."""
+    """Ends of titles: the name of each target if there are several."""
     targets = result.study.targets
     return [""] if len(targets) == 1 else [f": {observable_label(target.observable)}" for target in targets]

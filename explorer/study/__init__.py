@@ -1,1 +1,1 @@
-"""A calibration: from its order to its files, changed, watched, and read again."""
+"""A calibration: from its order to its files; edited, watched, and read back."""

@@ -1,4 +1,4 @@
-"""What a study takes before it is started: its runs, time by what stored pours of its kind took, and memory."""
+"""What a study will take, before it is started: runs, time (from stored pours of its kind), and memory."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from solver.rigs.rig import Rig
 from solver.scenes.time_step import time_step
 
 FEWEST = 3
-"""Stored pours from which a time is told."""
+"""Stored pours needed to state a mean time."""
 PACES: dict[type[Rig], float] = {Funnel: 80e6}
 """Spheres × time steps per second of one process, two at once on two cores: between the quick study's 48 million (90
 pours of 326 spheres, 2.2 s each) and the standard one's 136 million (923 spheres, 2.9 s)."""
 PACE = 20e6
-"""The same in other rigs, where less of the time is slept: 4 million of steel balls behind a lip, 13 of seeds in a
-funnel of triangles, 17 of wheat, 20 in a drum, 28 in a draw-down box, 91 under a lifted cylinder."""
+"""The same in other rigs, where bodies sleep for less of the time: 4 million for steel balls behind a lip, 13 for seeds
+in a funnel of triangles, 17 for wheat, 20 in a drum, 28 in a draw-down box, 91 under a lifted cylinder."""
 SETTLING = 1.1
 """Simulated time [s] from the last body's entry to rest; mean of the same pours."""
 WORKER_GB = 0.25
-"""Resident memory of a process that pours, with a study's few hundred bodies [GB]: 0.22 to 0.23 of the shipped ones."""
+"""Resident memory of a pouring process with a study's few hundred bodies [GB]: 0.22 to 0.23 for the shipped ones."""
 SPHERE_GB = 3.3e-6
 """Further memory for each member sphere [GB]: a funnel of 162 358 spheres takes 0.79 GB, one of 160 takes 0.25."""
 LONG = 600.0
-"""Time of a pour [s] above which the command line tells it beforehand."""
+"""Time of a pour [s] above which the command line announces it beforehand."""
 
 
 def duration_text(study: Study, profile: Profile, store: Path, workers: int | None = None) -> str:
@@ -44,14 +44,14 @@ def duration_text(study: Study, profile: Profile, store: Path, workers: int | No
     study, profile
         What is asked for.
     store
-        File of the store; it need not be there.
+        File of the store; it need not exist.
     workers
-        Pours at once; None: one on every core.
+        Number of simultaneous pours; None: one per core.
 
     Returns
     -------
-    One line. Runs that are stored already cost nothing, so it is an upper bound where they are; replacements of runs
-    without a pile come on top.
+    One line. Stored runs cost nothing, so the time is an upper bound if there are any. Replacements of runs without a
+    pile are not included.
     """
     workers = workers or available_cores()
     counts = runs_of_scenes(study, profile)
@@ -79,7 +79,7 @@ def duration_text(study: Study, profile: Profile, store: Path, workers: int | No
 
 
 def runs_of_scenes(study: Study, profile: Profile) -> dict[str, int]:
-    """Planned runs in the study's own rig, under "", and in each further experiment: all of those have as many."""
+    """Planned runs in the study's own rig, under "", and in each further experiment (equally many in each)."""
     every = sum(planned_runs(study, profile).values())
     own = sum(planned_runs(replace(study, experiments={}), profile).values())
     others = {name: (every - own) // len(study.experiments) for name in study.experiments}
@@ -90,13 +90,13 @@ def reckoned_time(study: Study, profile: Profile, experiment: str = "") -> float
     """Time of one pour [s]: spheres × steps / ``PACES``, from the first body's entry to the end; NaN without a feed."""
     try:
         sized = with_profile(study, profile.name)[0]
-    except ValueError:  # a profile that this study cannot have, which is told where it is started
+    except ValueError:  # a profile that this study cannot have, which is reported when it is started
         return math.nan
     return pour_time(sized.scene_of(experiment))
 
 
 def pour_time(scene: Scene) -> float:
-    """Time of one pour of ``scene`` [s], reckoned as in :func:`reckoned_time`."""
+    """Time of one pour of ``scene`` [s], estimated as in :func:`reckoned_time`."""
     if "insertion.rate" not in parameters(scene):
         return math.nan
     counts = body_counts(scene)
@@ -116,7 +116,7 @@ def spheres_of(scene: Scene) -> int:
 
 
 def large_pour_text(scene: Scene) -> str:
-    """What one pour of ``scene`` takes, where that is more than ``LONG``; otherwise "". Reckoned before it begins."""
+    """What one pour of ``scene`` takes, if that is more than ``LONG``; otherwise "". Estimated before it begins."""
     seconds = pour_time(scene)
     if not seconds > LONG:
         return ""
@@ -137,13 +137,13 @@ def _worker_gb(study: Study, profile: Profile) -> float:
     """Memory of one process that pours for ``study`` [GB]."""
     try:
         sized = with_profile(study, profile.name)[0]
-    except ValueError:  # told where the study is started
+    except ValueError:  # reported when the study is started
         return WORKER_GB
     return WORKER_GB + SPHERE_GB * max(spheres_of(sized.scene_of(name)) for name in ("", *study.experiments))
 
 
 def stored_times(study: Study, profile: Profile, store: Path, experiment: str = "") -> list[float]:
-    """Wall times [s] of the stored pours of ``study`` with the shapes of ``profile``, in the rig and with the mass."""
+    """Wall times [s] of stored pours of ``study`` with the shapes of ``profile``, with the same rig and mass."""
     if not store.is_file():
         return []
     scene = study.scene_of(experiment)
@@ -153,4 +153,4 @@ def stored_times(study: Study, profile: Profile, store: Path, experiment: str = 
         with closing(Store(store, pouring=False)) as kept:
             return kept.wall_times(study.name, wanted)
     except StoreError:
-        return []  # told where it is used
+        return []  # reported where the store is used

@@ -1,6 +1,6 @@
 """``explorer verify --economy``: pour a material with and without an economy, and say whether the piles are alike.
 
-Pours are kept in a store, so an interrupted comparison goes on where it stopped.
+Pours are kept in a store, so an interrupted comparison continues where it stopped.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Say = Callable[[str], None]
 SEED = 20261123
 """Root of the seeds of all pours."""
 TIMED = 2
-"""Pours of each kind after which it is said how long all of them take."""
+"""Pours of each kind after which the total time is estimated."""
 
 
 def compare_economy(
@@ -37,15 +37,15 @@ def compare_economy(
     change
         Name of the economy (``doe.studies.economy.ECONOMIES``).
     pours
-        Of each kind at each of the three settings.
+        Number of each kind at each of the three settings.
     store, out
-        Where pours are kept (None: the default store), and the file for what came out.
+        Where pours are kept (None: the default store), and the file for the result.
     say
-        Takes lines for a person.
+        Takes lines for the user.
 
     Returns
     -------
-    What came out; also written to ``out`` after every tenth of the pours.
+    The result; also written to ``out`` after every tenth of the pours.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""A study with other ranges and another target: the study's file, changed, as a file of its own; or what was measured,
+"""A study with other ranges or another target: the study's file, changed, as a file of its own; or a measured target,
 written into the file itself.
 
-What is changed is given by the names of factors and, for the first target, by its keys; everything else stays as it is
-in the file, comments included. The result is read back by the loader of every study before anything is started.
+Changes are given by the names of factors and, for the first target, by its keys. Everything else stays as it is in the
+file, comments included. The loader that reads every study reads the result back before anything is started.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from solver.assets import shipped_assets
 TARGET_KEYS = ("mean", "sd", "n", "margin")
 RANGE_KEYS = ("low", "high", "reference")
 MEASURED_KEYS = ("mean", "sd", "n", "sd_source")
-"""Keys of a target that a measurement replaces; its weight and margin are a decision and stay."""
+"""Keys of a target that a measurement replaces; weight and margin are decisions and stay."""
 TARGET_LINE = re.compile(r"\s*\[\[\s*target\s*\]\]")
 KEY_LINE = re.compile(r"""(\s*)(\w+)(\s*=\s*)("[^"]*"|'[^']*'|[^\s#]+)(.*)""", re.DOTALL)
 
 
 @dataclass(frozen=True)
 class StudyEdits:
-    """What is asked otherwise than in the file; SI. Empty: nothing."""
+    """What is to differ from the file; SI. Empty: nothing."""
 
     factors: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Factor's name → some of ``RANGE_KEYS`` → value."""
@@ -43,8 +43,8 @@ class StudyEdits:
 
 
 def edited_study(file: Path, edits: StudyEdits) -> tuple[str, Study]:
-    """Text of the changed study and the study that it gives. Raises a ValueError with one line."""
-    read_toml(file)  # refuses in one line what is no TOML
+    """Text of the changed study, and the study itself. Raises a ValueError in one line."""
+    read_toml(file)  # refuses invalid TOML in one line
     document = tomlkit.parse(file.read_text(encoding="utf-8-sig"))
     _edit(document, edits, file.parent)
     text = _heading(file, edits) + tomlkit.dumps(document)
@@ -55,7 +55,7 @@ def edited_study(file: Path, edits: StudyEdits) -> tuple[str, Study]:
 
 
 def _edit(document: tomlkit.TOMLDocument, edits: StudyEdits, folder: Path) -> None:
-    """Change a study that stands in ``folder``; a material's own file is named by its full path."""
+    """Change a study whose file is in ``folder``; a material file of the user's own is named by its full path."""
     entries: dict[str, Any] = {str(entry.get("name")): entry for entry in document.get("factor", [])}
     for name, values in edits.factors.items():
         if name not in entries:
@@ -88,12 +88,12 @@ def _heading(file: Path, edits: StudyEdits) -> str:
 
 
 def remeasured(file: Path, target: Target, note: str) -> str:
-    """Text of the study ``file``, in which ``target`` has the place of the one of its observable.
+    """Text of the study ``file``, in which ``target`` replaces the target with the same observable.
 
-    Only the lines of ``MEASURED_KEYS`` change; what stands behind a value, and the ends of lines, stay. ``note``
-    becomes a comment above ``mean``, in the place of an earlier one that begins with the same word.
+    Only the lines of ``MEASURED_KEYS`` change; whatever follows a value, and line endings, stay. ``note`` becomes a
+    comment above ``mean`` and replaces an earlier one that begins with the same word.
 
-    Raises CommandError in one line where the file does not write that target with a line for each key.
+    Raises CommandError in one line if the file does not write that target with one line per key.
     """
     before = read_toml(file)
     place = next(k for k, one in enumerate(before["target"]) if one["observable"] == target.observable)
@@ -118,7 +118,7 @@ def remeasured(file: Path, target: Target, note: str) -> str:
 
 
 def _remeasured_lines(lines: list[str], values: Mapping[str, float | str], note: str) -> list[str]:
-    """The lines of a target with other ``values``: a missing key follows on ``mean``, one without a value goes."""
+    """The lines of a target with new ``values``: a missing key is added after ``mean``, one without value removed."""
     there = {match[2] for line in lines if (match := KEY_LINE.match(line))}
     found: list[str] = []
     for line in lines:
@@ -134,7 +134,7 @@ def _remeasured_lines(lines: list[str], values: Mapping[str, float | str], note:
             found.append(f"{indent}{note}{end}")
         if key in values:
             new, comment = _toml(values[key]), behind.lstrip()
-            # A comment stays in its column where the new value leaves room.
+            # A comment stays in its column if the new value leaves room.
             gap = max(1, len(old) + len(behind) - len(comment) - len(new)) if comment else 0
             found.append(f"{indent}{key}{equals}{new}{' ' * gap}{comment}{end}")
         if key == "mean":

@@ -1,4 +1,4 @@
-"""Runs that a person leaves out of the surface of a finished study: kept beside its result, with the reasons."""
+"""Runs that the user leaves out of the surface of a finished study, kept beside its result with the reasons."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_BYTES = 1_000_000
 
 
 def load_excluded(folder: Path) -> tuple[ExcludedRun, ...]:
-    """What is left out of the study in ``folder``; empty where nothing is. Raises CommandError for another file."""
+    """The runs left out of the study in ``folder``; empty if none. Raises CommandError for a file in another form."""
     file = folder / FILE
     if not file.is_file():
         return ()
@@ -37,7 +37,7 @@ def load_excluded(folder: Path) -> tuple[ExcludedRun, ...]:
 
 
 def keep_excluded(folder: Path, result: StudyResult, excluded: Sequence[ExcludedRun]) -> None:
-    """Keep what is left out of ``result``, the study in ``folder``, in place of what was.
+    """Keep the runs left out of ``result``, the study in ``folder``, in place of those kept before.
 
     Raises CommandError, with nothing changed, for a run that the surface does not have.
     """

@@ -1,4 +1,4 @@
-"""What an automatic check reads of a calibration: a summary in Markdown, and JUnit XML with a case per question."""
+"""What CI reads of a calibration: a summary in Markdown, and JUnit XML with one case per question."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def read_baseline(path: Path) -> StudyResult:
 
 
 def summary(result: StudyResult, compared: Sequence[Compared]) -> str:
-    """Verdict, parameters, and what has moved against the baseline, as Markdown."""
+    """Verdict, parameters, and what has moved from the baseline, as Markdown."""
     lines = [f"# {result.study.title}: calibration", ""]
     for target, test in zip(result.verification.targets, result.verification.tests, strict=True):
         name, found = target.observable, test.simulated
@@ -47,7 +47,7 @@ def summary(result: StudyResult, compared: Sequence[Compared]) -> str:
 
 
 def junit(result: StudyResult, compared: Sequence[Compared], fail_above: float | None) -> str:
-    """One case per quantity compared, failed if it has moved, and per target one for the limit on its error."""
+    """One case per compared quantity, failed if it has moved, and one per target for the limit on its error."""
     cases = [(_what(one), one.why, change(one) if one.answer == "moved" else "") for one in compared]
     if fail_above is not None:
         cases += [(one.name, f"{one.percent:.2f} %", one.fault(fail_above)) for one in errors(result)]
@@ -75,20 +75,20 @@ def junit(result: StudyResult, compared: Sequence[Compared], fail_above: float |
 
 @dataclass(frozen=True)
 class RelativeError:
-    """How far the mean of the fresh pours lies from one target, in percent of it."""
+    """How far the mean of the fresh pours is from one target, in percent of the target."""
 
     name: str
     percent: float
 
     def fault(self, limit: float) -> str:
-        """What is wrong where the error is above ``limit`` percent (or no number), else nothing."""
+        """What is wrong if the error is above ``limit`` percent (or not a number), else ""."""
         if self.percent <= limit:
             return ""
         return f"{self.name} {self.percent:.2f} % is above the limit of {limit:g} %"
 
 
 def errors(result: StudyResult) -> tuple[RelativeError, ...]:
-    """Of every target."""
+    """Relative error of every target."""
     return tuple(
         RelativeError(f"{observable_label(target.observable)}: relative error", test.relative_error_percent)
         for target, test in zip(result.verification.targets, result.verification.tests, strict=True)

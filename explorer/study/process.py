@@ -25,7 +25,7 @@ ENDINGS = {0: "report", 3: "above the error limit; report"}
 RESULT, PARTIAL = "result.json", "partial.json"
 NO_EDITS = StudyEdits()
 CHANGED = "_changed.toml"
-"""End of the name of a study's own file in its output folder."""
+"""End of the file name of a changed study in its output folder."""
 
 
 class StudyProcess(BackgroundOrders, Protocol):
@@ -33,29 +33,29 @@ class StudyProcess(BackgroundOrders, Protocol):
 
     @property
     def study_file(self) -> Path:
-        """The study as it is without changes."""
+        """File of the unchanged study."""
 
     @property
     def present(self) -> QueuedStudy | None:
-        """The study that was started last, None where it was one of an earlier session of the page."""
+        """The study that was started last; None if it was one of an earlier session of the page."""
 
     def start(self, profile: str, edits: StudyEdits = NO_EDITS, file: Path | None = None) -> None:
-        """Start a new study, of another ``file`` than ``study_file`` where one is given.
+        """Start a new study, from ``file`` if given, else from ``study_file``.
 
-        Raises a ValueError where one runs already or the order cannot be carried out.
+        Raises a ValueError if one is running already or the order cannot be carried out.
         """
 
     def queue(self, profile: str, edits: StudyEdits = NO_EDITS) -> None:
-        """Start it after those before it; at once if none runs and none waits."""
+        """Start it after those already queued; at once if none runs and none waits."""
 
     def resume(self) -> None:
-        """Go on with the study stopped last, also before this page. Raises BackgroundError where there is none."""
+        """Continue the study stopped last, even in an earlier session. Raises BackgroundError if there is none."""
 
     def resumable(self) -> bool:
-        """Whether :meth:`resume` has something to go on with."""
+        """Whether :meth:`resume` has something to continue."""
 
     def retry(self) -> None:
-        """Run it again with more seeds for replicates without a valid run. Raises BackgroundError where none is."""
+        """Run it again with more seeds for replicates without a valid run. Raises BackgroundError if there is none."""
 
 
 @dataclass(frozen=True)
@@ -63,11 +63,11 @@ class QueuedStudy:
     """One study that was asked for."""
 
     stem: str
-    """Of its study file's name."""
+    """Stem of its study file's name."""
     profile: str
     edits: StudyEdits
     text: str
-    """Content of its own study file; empty for the page's file as it is."""
+    """Content of its own study file; empty for the page's unchanged file."""
     photographed: PhotographedTarget | None
     """Photographs in place of the study's own target."""
     study: Study
@@ -78,11 +78,11 @@ class CalibrationProcess(OrderedCommands[QueuedStudy]):
 
     Args:
         study_file: the study.
-        folder: output folders are made in here, one per start: ``<study>-<profile>-<date>-<time>``.
+        folder: where output folders are made, one per start: ``<study>-<profile>-<date>-<time>``.
         store: file of the store of runs; None for the default store.
         program: how the command line is called.
-        target: folder of the photographs that are the target of every study that is ordered while they are there.
-        place: where studies pour that are started or resumed from then on; None for this machine.
+        target: folder of photographs; while it holds any, they are the target of every study that is ordered.
+        place: where studies that are started or resumed from then on do their pours; None for this machine.
     """
 
     def __init__(
@@ -99,23 +99,23 @@ class CalibrationProcess(OrderedCommands[QueuedStudy]):
         self._place = place or PourPlace()
         self._profile, self._tries = "", TRIES
         self.present: QueuedStudy | None = None
-        """The study that was started last, None where it was one of an earlier session of the page."""
+        """The study that was started last; None if it was one of an earlier session of the page."""
 
     def start(self, profile: str, edits: StudyEdits = NO_EDITS, file: Path | None = None) -> None:
         """Start a new calibration with ``profile``.
 
-        A copy of another study's ``file`` is kept in the output folder; the photographs are not its target.
+        If ``file`` is another study's, a copy is kept in the output folder, and the photographs are not its target.
         """
         order = self._order(profile, edits, file)
         self._process.refuse_while_running()
         self._begin(order)
 
     def queue(self, profile: str, edits: StudyEdits = NO_EDITS) -> None:
-        """Start it when those before it have ended."""
+        """Start it when those queued before it have ended."""
         self._add(self._order(profile, edits))
 
     def resume(self) -> None:
-        """Go on where a calibration was stopped last, be it one of an earlier session of the page.
+        """Continue the calibration that was stopped last, even one of an earlier session of the page.
 
         Runs that are in the store are not repeated.
         """
@@ -132,11 +132,11 @@ class CalibrationProcess(OrderedCommands[QueuedStudy]):
         """Whether one was stopped before its end, in this session of the page or before."""
         try:
             return self._stopped() is not None
-        except ValueError:  # the study's file cannot be read, which is told where one is started
+        except ValueError:  # the study's file cannot be read, which is reported when a study is started
             return False
 
     def retry(self) -> None:
-        """Run the last calibration again, with more seeds for replicates that are left without a valid run."""
+        """Run the last calibration again, with more seeds for replicates without a valid run."""
         self._process.refuse_while_running()
         out, last = self._process.out, self._process.status()
         if out is None or (last.state != "failed" and not given_up(last.tried, self._tries)):
@@ -169,7 +169,7 @@ class CalibrationProcess(OrderedCommands[QueuedStudy]):
         return f"{order.profile}{', changed' if order.text else ''}"
 
     def _stopped(self) -> tuple[Path, str] | None:
-        """Folder and profile of the last study where it was stopped before its end, else as :meth:`_unfinished`."""
+        """Folder and profile of the last study if it was stopped before its end, else those of :meth:`_unfinished`."""
         out = self._process.out
         return (out, self._profile) if out is not None and not (out / RESULT).exists() else self._unfinished()
 

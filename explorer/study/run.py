@@ -1,8 +1,9 @@
-"""A calibration from its order to its files: the study is read, run, and written as result.json and reports.
+"""A calibration from its order to its files: read the study, run it, and write result.json and reports.
 
-While it runs, ``partial.json`` holds what it has found so far (`doe.studies.study_result.PartialStudy`): stages that
-have ended as in ``result.json``, and under ``partial`` the name of the stage that runs, whose own key, if there, holds
-its analysis of the runs so far, and ``line`` says it in words. The file is gone once ``result.json`` is written.
+While it runs, ``partial.json`` holds what it has found so far (`doe.studies.study_result.PartialStudy`). Stages that
+have ended stand there as in ``result.json``. ``partial`` names the stage that is running; the key of that stage, if
+present, holds its analysis of the runs so far, and ``line`` says it in words. The file is removed once ``result.json``
+is written.
 """
 
 from __future__ import annotations
@@ -79,9 +80,9 @@ class StudyOrder:
     author: str = ""
     notes: str = ""
     target: Path | None = None
-    """Folder of photographs that take the place of the study's own angle of repose (`explorer.photograph.target`)."""
+    """Folder of photographs that replace the study's own angle of repose (`explorer.photograph.target`)."""
     beyond_reach: bool = False
-    """Leave out the stage that stops a study whose target no setting comes near."""
+    """Leave out the stage that stops a study if no setting comes near its target."""
     piles: Path | None = None
     """New file for the answer as a recording; ``record``: folder for all pours of the verification."""
     scheduler: str = ""
@@ -91,8 +92,8 @@ class StudyOrder:
 def run_study(order: StudyOrder, reporter: Reporter) -> StudyResult:
     """Run the whole chain and write the files; returns the content of ``result.json``.
 
-    Finished runs are kept in the store, so a study that was interrupted goes on where it stopped. With ``piles`` the
-    result that stands in the folder already, if there is one, is only recorded.
+    Finished runs are kept in the store, so an interrupted study continues where it stopped. With ``piles``, a result
+    that is already in the folder is only recorded.
     """
     study, profile = with_profile(load_study(order.study), order.profile)
     if order.beyond_reach:
@@ -107,7 +108,7 @@ def run_study(order: StudyOrder, reporter: Reporter) -> StudyResult:
     photographed = given_target(order)
     if photographed is not None:
         study = replace(study, targets=photographed.of_study(study.targets))
-    # The page puts these there before the start.
+    # The page puts these files there before the start.
     own = [study.file, *([order.target] if order.target else [])]
     check_vacant(order.out, own=own, resume=order.resume)
     _check_same(order.out, study)
@@ -115,9 +116,9 @@ def run_study(order: StudyOrder, reporter: Reporter) -> StudyResult:
         from explorer.recordings.pour_recorder import check_recordings
 
         check_recordings(order.record, order.resume)
-    # A recorder watches pours from within; all others run in processes of their own.
+    # A recorder watches pours from within this process; otherwise pours run in processes of their own.
     apart = order.record is None and chosen() == "cpu"
-    # Both before anything is in the folder: a stage may refuse its table, and perhaps no scheduler answers.
+    # Both come before writing to the folder: a stage may refuse its table, and perhaps no scheduler answers.
     planned = planned_runs(study, profile)
     with kept_for_one(order.out), executor(order.threads, order.scheduler) if apart else nullcontext() as pool:
         reporter.begin(order.out, order.resume)
@@ -133,9 +134,9 @@ def _run(
     pool: Executor | None,
     reporter: Reporter,
 ) -> StudyResult:
-    """Pour, analyse and write into ``order.out``, which is there and this command's alone.
+    """Pour, analyse and write into ``order.out``, which exists and is reserved for this command.
 
-    ``planned`` are the runs that each stage will make.
+    ``planned`` is the number of runs that each stage will make.
     """
     say = reporter.say
     path = order.store or default_store()
@@ -144,7 +145,7 @@ def _run(
         photographed.copied(order.out / FOLDER)
         say(f"target: {photographed.line}")
     say(f"{study.name}, profile {profile.name}: {sum(planned.values())} runs of {1e3 * profile.mass:g} g; store {path}")
-    if not order.scheduler:  # how many cores those workers have, nobody knows beforehand
+    if not order.scheduler:  # how many cores those workers have is not known beforehand
         say(duration_text(study, profile, path, order.threads))
     progress = RunProgress(reporter, planned)
     progress.compiling()
@@ -179,7 +180,7 @@ def _run(
     about = made_today(order.author, order.notes)
     result = replace(result_of(study, profile, found, reporter.elapsed, order.tries, about), piles=piles)
     text = json.dumps(result.to_dict(), ensure_ascii=False, allow_nan=False, indent=1)
-    # First and by itself: a report that cannot be written costs no study.
+    # Written first, by itself: if a report cannot be written, the study is not lost.
     write_whole(order.out / RESULT, text + "\n")
     reporter.result = order.out / RESULT
     missing = write_report(result, order.out, {"result.json": text + "\n"})
@@ -195,7 +196,7 @@ def _run(
 def poured_piles(stages: Stages, store: Store) -> tuple[PouredPile, ...]:
     """Mean silhouettes at the reference setting and at the optimum, read off the stored pours.
 
-    None of those that are lost or damaged: their numbers are in the result, which is not to be lost with them.
+    Lost or damaged pours are skipped: their numbers are in the result, which must not be lost with them.
     """
     chosen = (
         ("reference", stages.reference_runs()),
@@ -235,9 +236,9 @@ def _silhouettes(run: StoredRun | None) -> list[tuple[FloatArray, FloatArray]]:
 
 
 def given_target(order: StudyOrder) -> PhotographedTarget | None:
-    """The photographs that ``order`` names, or that the study it goes on with was started with; None without them.
+    """The photographs that ``order`` names, or with which the study that it continues was started; None if none.
 
-    Raises CommandError in one line where the folder that is named holds none.
+    Raises CommandError in one line if the named folder holds none.
     """
     named = order.target
     if named is None:
@@ -251,7 +252,7 @@ def given_target(order: StudyOrder) -> PhotographedTarget | None:
 
 
 def _recorder(folder: Path) -> StudyRecorder:
-    # rerun takes a second to import; only those who record pay for it.
+    # rerun takes a second to import, so it is imported only for recording.
     from explorer.recordings.pour_recorder import StudyRecorder
 
     return StudyRecorder(folder)
@@ -264,7 +265,7 @@ def _record_piles(path: Path, result: StudyResult, say: Callable[[str], None]) -
 
 
 def _finished(out: Path, file: Path, profile: str) -> StudyResult | None:
-    """The result in the folder; None where there is none. CommandError where it is of another study or profile."""
+    """The result in the folder; None if there is none. Raises CommandError if it is of another study or profile."""
     result = read_result(StudyResult, out, RESULT)
     if result is None:
         return None
@@ -277,9 +278,9 @@ def _finished(out: Path, file: Path, profile: str) -> StudyResult | None:
 
 
 def _check_same(out: Path, study: Study) -> None:
-    """Raise CommandError where ``out`` holds what another study has found, which going on there would overwrite.
+    """Raise CommandError if ``out`` holds the findings of another study, which continuing there would overwrite.
 
-    Of any version of the program, and whatever was changed in the study since.
+    This holds for results of any version of the program, whatever was changed in the study since.
     """
     described = (ResultFile(RESULT, PARTIAL).read(out) or {}).get("study")
     name = described.get("name") if isinstance(described, dict) else None
@@ -288,25 +289,25 @@ def _check_same(out: Path, study: Study) -> None:
 
 
 class PartialResult:
-    """The file in the output folder of one study."""
+    """The file ``partial.json`` in the output folder of one study."""
 
     def __init__(self, folder: Path, study: StudyDescription) -> None:
         self._file, self._found = folder / PARTIAL, PartialStudy(study=study)
         self.remove()
 
     def show(self, stage: str, result: StageResult) -> None:
-        """``result`` is what ``stage`` found so far."""
-        # A mean that no run has given yet is no finding.
+        """Write ``result``, which ``stage`` has found so far."""
+        # A mean without any run yet is not a finding.
         line = "" if re.search(r"\bnan\b", result.line) else result.line
         self._write(replace(self._found.with_result(stage, result), partial=stage, line=line))
 
     def keep(self, stage: str, result: StageResult | None) -> None:
-        """``stage`` has ended with ``result``, None where the study has no such stage."""
+        """Keep ``result``, with which ``stage`` has ended; None if the study has no such stage."""
         self._found = self._found.with_result(stage, result)
         self._write(self._found)
 
     def remove(self) -> None:
-        """Take the file away."""
+        """Remove the file."""
         self._file.unlink(missing_ok=True)
 
     def _write(self, content: PartialStudy) -> None:

@@ -18,7 +18,7 @@ def stages_with_runs(result: AnyStudy) -> tuple[str, ...]:
 
 
 def settings_of(result: AnyStudy, stage: str, label: str) -> Values:
-    """What was changed against the study's scene in the setting ``label`` of ``stage``: path → SI or name."""
+    """What the setting ``label`` of ``stage`` changes in the study's scene: path → SI or name."""
     begun = stages_with_runs(result)
     if stage not in begun:
         raise CommandError(f"{stage}: no such stage in this study; allowed: {', '.join(begun) or 'none yet'}")
@@ -35,10 +35,10 @@ def settings_of(result: AnyStudy, stage: str, label: str) -> Values:
 def scene_of(result: AnyStudy, stage: str, run: Run) -> tuple[Scene, bool]:
     """The scene of a run of ``stage``, and whether it is the stored one to the last bit (the same key).
 
-    It is not where the program, the study file or its material have changed since. Raises a ValueError where the study
-    file is gone or does not know the parameters any more.
+    It is not if the program, the study file or its material has changed since. Raises a ValueError if the study file is
+    gone or no longer knows the parameters.
     """
-    # The profile as it was: the file's own may have been changed since.
+    # The profile as it was: the one in the file may have been changed since.
     profile = result.study.profile
     study = replace(load_study(result.study.file), profiles={profile.name: profile})
     study, _ = with_profile(study, profile.name)
@@ -47,6 +47,6 @@ def scene_of(result: AnyStudy, stage: str, run: Run) -> tuple[Scene, bool]:
 
 
 def observed_of(run: Run, observable: str) -> str:
-    """What was read off a run, with its unit; a dash where it does not count."""
+    """What was read off a run, with its unit; a dash if the run does not count."""
     value = run.observables.get(observable)
     return observed(observable, value) if value is not None and run.valid else MISSING

@@ -1,8 +1,9 @@
-"""From what a person does at the page to its loop: actions, buttons, keys, work off the loop, and the loop's clock.
+"""From the user's input on the page to its loop: actions, buttons, keys, work off the loop, and the loop's clock.
 
-viser calls back on many threads. A callback only leaves an action here; the one thread that owns session and page
-carries it out, and shows the one line of whatever was refused, by us or by the machine. What the program itself sets
-is no click. Work that takes seconds (reading scans, fitting spheres) is done off the loop, one thing at a time.
+viser calls back on many threads. A callback only posts an action here. The one thread that owns session and page
+carries it out, and shows a one-line message if the program or the machine refuses it. Values set by the program itself
+do not count as clicks. Work that takes seconds (reading scans, fitting spheres) is done off the loop, one job at a
+time.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ from explorer.errors import CommandError
 Action = Callable[[], None]
 Post = Callable[[Action], None]
 ClientAction = Callable[[Any], None]
-"""Something that is done to one browser."""
+"""An action on one browser."""
 Found = TypeVar("Found")
 HANDS_OFF = 1.5
-"""Seconds after a person's input during which the program's own value does not move the widget."""
+"""Seconds after the user's input during which the program's own value does not move the widget."""
 
 
 class Actions:
@@ -36,13 +37,13 @@ class Actions:
         self._waiting: queue.SimpleQueue[Action] = queue.SimpleQueue()
 
     def post(self, action: Action) -> None:
-        """Leave ``action`` for the loop; from any thread."""
+        """Post ``action`` for the loop; from any thread."""
         self._waiting.put(action)
 
     def carry_out(self) -> str | None:
-        """Run all that waits now. The line of the last input that was refused, "" if none was, None if nothing ran.
+        """Run all waiting actions. Returns the message of the last refused input, "" if none was, None if nothing ran.
 
-        What comes meanwhile waits for the next call: between two of them the page is drawn, however much comes.
+        Actions posted meanwhile wait for the next call, so the page is drawn between two calls, however many arrive.
         """
         notice: str | None = None
         for _ in range(self._waiting.qsize()):
@@ -56,28 +57,28 @@ class Actions:
 
 
 def refusal(error: ValueError | OSError) -> str:
-    """The line of what was refused, by us or by the machine: a full disk, a folder that may not be written to."""
+    """One-line message of a refusal by the program or the machine (a full disk, a folder without write permission)."""
     return f"{error.filename or 'file'}: {error.strerror or error}" if isinstance(error, OSError) else str(error)
 
 
 class FrameClock:
-    """Frames every ``interval`` [s], counted from when the last one was due: what waits too long does not add up."""
+    """Frames every ``interval`` [s], counted from when the last one was due, so that overlong waits do not add up."""
 
     def __init__(self, interval: float) -> None:
         self._interval, self._due = interval, time.monotonic()
 
     def wait(self, stop: threading.Event) -> None:
-        """Wait until the next frame is due, or ``stop`` is set; not at all where it is due already."""
+        """Wait until the next frame is due, or ``stop`` is set; not at all if it is already due."""
         self._due = max(self._due + self._interval, time.monotonic())
         stop.wait(self._due - time.monotonic())
 
 
 class SharedBox:
-    """A widget that a person and the program (the solver's values, another panel) both move.
+    """A widget that both the user and the program (the solver's values, another panel) move.
 
-    viser writes what a browser sends into the handle at once and calls back on another thread, many milliseconds later
-    on a busy machine. Whoever follows the program meanwhile would put the old value back, and the call would read that:
-    so a value that the program did not write counts as a person's hand from the moment it is seen.
+    viser writes what a browser sends into the handle at once but calls back on another thread, on a busy machine many
+    milliseconds later. An update by the program in between would restore the old value, which the callback would read.
+    So a value that the program did not write counts as the user's from the moment it is seen.
     """
 
     def __init__(self, handle: Any) -> None:
@@ -89,14 +90,14 @@ class SharedBox:
         return self.handle.value
 
     def held(self) -> bool:
-        """Whether a person is at it, or was ``HANDS_OFF`` ago."""
-        # `in` and not `==`: a browser may send NaN, which is the same thing and yet not equal.
+        """Whether the user is moving the widget, or did so within the last ``HANDS_OFF``."""
+        # `in` and not `==`: a browser may send NaN, which is identical to itself but not equal.
         if self.handle.value not in (self._known,):
             self._touch()
         return time.monotonic() < self._touched + HANDS_OFF
 
     def listen(self, post: Post, take: Callable[[Any], None]) -> None:
-        """Hand what a person enters, and not what the program shows, to ``take`` on the loop."""
+        """Hand what the user enters, but not what the program shows, to ``take`` on the loop."""
 
         def entered(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is not None:
@@ -110,7 +111,7 @@ class SharedBox:
         self._touched, self._known = time.monotonic(), self.handle.value
 
     def show(self, value: Any) -> None:
-        """Move it to what the program has."""
+        """Move the widget to the program's value."""
         self.handle.value = value
         self._known = self.handle.value
 
@@ -131,7 +132,7 @@ def button_group(gui: viser.GuiApi, title: str, acts: Mapping[str, Action], post
 def client_buttons(
     gui: viser.GuiApi, title: str, acts: Mapping[str, ClientAction], post: Post, hint: str | None = None
 ) -> Any:
-    """A row of buttons named by the keys of ``acts``; a click posts the action with the browser that it came from.
+    """A row of buttons named by the keys of ``acts``; a click posts the action with the browser it came from.
 
     Returns viser's handle.
     """
@@ -146,7 +147,7 @@ def client_buttons(
 
 
 def add_keys(gui: viser.GuiApi, acts: Mapping[str, Action], keys: Mapping[str, Any], post: Post) -> None:
-    """A command per entry of ``keys`` (label → key), which posts the action of that label; in viser's palette too."""
+    """A command per entry of ``keys`` (label → key), which posts its action; also listed in viser's palette."""
     for label, key in keys.items():
         gui.add_command(label, hotkey=key).on_trigger(_posting(acts[label], post))
 
@@ -179,7 +180,7 @@ def on_upload(button: viser.GuiUploadButtonHandle, take: Callable[[str, bytes], 
 
 
 class BackgroundWork:
-    """Runs one piece of work in a thread; what it found, or what was wrong, comes back as an action."""
+    """Runs one job at a time in a thread; its result or error comes back as an action."""
 
     def __init__(self, post: Post) -> None:
         self._post, self._busy_with = post, ""
@@ -187,13 +188,13 @@ class BackgroundWork:
 
     @property
     def busy_with(self) -> str:
-        """What is being done, empty if nothing is."""
+        """The job being done; empty if there is none."""
         return self._busy_with
 
     def start(self, what: str, work: Callable[[], Found], done: Callable[[Found], None]) -> None:
-        """Begin ``work``; ``done`` is called with its result by the page's loop. From that loop only.
+        """Begin ``work``; the page's loop calls ``done`` with its result. Call it from that loop only.
 
-        Raises CommandError while something else is being done. ``work`` must neither touch the session nor the page.
+        Raises CommandError while another job is being done. ``work`` must touch neither the session nor the page.
         """
         if self._busy_with:
             raise CommandError(f"{what}: wait until this is done: {self._busy_with}")
@@ -201,7 +202,7 @@ class BackgroundWork:
         threading.Thread(target=self._run, args=(what, work, done), daemon=True, name="explorer-background").start()
 
     def start_when_free(self, what: str, work: Callable[[], Found], done: Callable[[Found], None]) -> None:
-        """The same at once, or as soon as what is being done is done: for what would be lost by a refusal."""
+        """Begin ``work`` at once, or as soon as the present job is done: for work that a refusal would lose."""
         self._next.append(lambda: self.start(what, work, done))
         self._go_on()
 
@@ -215,7 +216,7 @@ class BackgroundWork:
         except OSError as error:
             line = f"{what}: {error.strerror or error}"
             self._post(lambda: self._refuse(CommandError(line)))
-        except Exception as error:  # a refusal becomes the notice; a mistake of the program is raised in the loop
+        except Exception as error:  # a refusal becomes the notice; a program error is raised in the loop
             problem = error
             self._post(lambda: self._refuse(problem))
         else:

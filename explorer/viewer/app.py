@@ -26,11 +26,11 @@ from solver.scenes.scene import Scene
 
 LABEL = "Granular material explorer"
 FOLLOW_INTERVAL = 2.0
-"""Seconds between two looks at the folder of a board."""
+"""Seconds between two checks of the folder of a board."""
 
 
 def print_address(url: str) -> None:
-    """Tell on the terminal where the page is."""
+    """Print the address of the page on the terminal."""
     print(f"The page is at {url} (Ctrl-C ends it)", flush=True)
 
 
@@ -51,27 +51,27 @@ def serve(
     """Serve the page of a live pour of ``scene``; blocks until SIGINT or SIGTERM (main thread only).
 
     Args:
-        project: what the page works on.
+        project: the project that the page works on.
         scene: what is poured first.
         host: address to listen on.
         port: port to listen on; 0 takes a free one.
         seed: seed of the first pour.
         store: file of the runs of study and diagnosis; None for the default store.
-        record_path: new file (``.rrd``) that the session is recorded into; a restart begins another beside
-            it. All of them are named on the terminal at the end.
-        rerun_viewer: address of a running rerun viewer that the session is sent to; empty: none.
-        token: what a browser has to show; None: nothing, which only a loopback address may do.
-        scheduler: address of a Dask scheduler whose workers pour for study, diagnosis and population, unless the page
-            says otherwise; empty: none.
+        record_path: new file (``.rrd``) into which the session is recorded; a restart begins another beside
+            it. All of them are listed on the terminal at the end.
+        rerun_viewer: address of a running rerun viewer to which the session is sent; empty: none.
+        token: token that a browser has to show; None: none, which is allowed only for a loopback address.
+        scheduler: address of a Dask scheduler whose workers pour for study, diagnosis and population, unless chosen
+            otherwise on the page; empty: none.
         ready: called with the address once the page can be opened.
 
     Raises:
         PortError: the port is busy, the host is not of this machine, or others can reach it without a token.
-        ParameterError: the scene is too big to be shown.
+        ParameterError: the scene is too large to be shown.
         CommandError: ``record_path`` cannot be a new recording.
     """
     with stopped_by_signals() as stop, ExitStack() as ending:
-        # Ended in reverse order, with the signals still caught: a second one must not leave processes behind.
+        # Closed in reverse order, with the signals still caught: a second signal must not leave processes behind.
         recorder = session_recorder(record_path) if record_path else None
         if recorder:
             ending.callback(lambda: print("\n".join(recorded_lines(recorder.pours)), flush=True))
@@ -106,10 +106,10 @@ def replay(
     """Serve a page that plays ``recording``; blocks until SIGINT or SIGTERM (main thread only).
 
     Raises:
-        CommandError: it is no recording of a pour.
+        CommandError: it is not a recording of a pour.
         PortError: the port is busy, the host is not of this machine, or others can reach it without a token.
     """
-    # Imported here: rerun takes a second to load, and a live page needs none of it.
+    # Imported here: rerun takes a second to load, and a live page does not need it.
     from explorer.recordings.recording_reader import read_recording
     from explorer.viewer.replay.replay_page import ReplayPage
 
@@ -137,7 +137,7 @@ def board(
         PortError: the port is busy, the host is not of this machine, or others can reach it without a token.
     """
     pages = WebPages(LABEL)
-    # Before the address is told: what cannot be shown is refused at once.
+    # Before the address is printed: what cannot be shown is refused at once.
     found = FolderBoard(folder, pages)
     with stopped_by_signals() as stop, ExitStack() as ending:
         server = guarded_server(host, port, LABEL, pages, token=token)
@@ -149,11 +149,11 @@ def board(
 
 @contextmanager
 def stopped_by_signals() -> Iterator[threading.Event]:
-    """An event that SIGINT and SIGTERM set; the handlers from before come back at the end."""
+    """An event that SIGINT and SIGTERM set; the former handlers are restored at the end."""
     stop, asked = threading.Event(), SimpleQueue[int]()
 
     def set_stop(number: int, frame: FrameType | None) -> None:
-        # Not the event itself: where a signal finds this thread inside stop.wait, its lock is held and never let go.
+        # Not the event itself: if a signal interrupts this thread in stop.wait, the lock is held and never released.
         asked.put(number)
 
     def set_when_asked() -> None:
@@ -168,4 +168,4 @@ def stopped_by_signals() -> Iterator[threading.Event]:
     finally:
         for number, handler in zip(numbers, before, strict=True):
             signal.signal(number, handler)
-        asked.put(0)  # so that the thread ends too
+        asked.put(0)  # so that the thread also ends

@@ -1,12 +1,12 @@
 """A viser server that neither a foreign web page nor a stranger can drive.
 
 viser 1.1.1 checks neither Origin nor Host, moves to another port when one is busy, lets any client open a public
-tunnel, and knows no password. All of this is closed here. The Host is checked besides the Origin because of DNS
-rebinding: a foreign page whose name has come to mean 127.0.0.1 is of the same origin as this server, but gives itself
-away by that name. Beyond this machine the page is served only to those who know its token; a browser shows it once and
-gets a cookie for it. What a browser may say after that is in :mod:`explorer.viewer.incoming`.
+tunnel, and has no password. All of these gaps are closed here. The Host is checked as well as the Origin because of DNS
+rebinding: a foreign page whose name has come to mean 127.0.0.1 has the same origin as this server, but that name gives
+it away. Beyond this machine, the page is served only to those who know its token; a browser shows the token once and
+gets a cookie for it. What a browser may send after that is in :mod:`explorer.viewer.incoming`.
 
-Private names of viser and one of ``websockets`` are used, which is why viser is pinned and a test watches each.
+Private names of viser and one of ``websockets`` are used; therefore viser is pinned and a test watches each name.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ from explorer.viewer.shell.web_pages import WebPages
 LOCAL_NAMES = ("127.0.0.1", "localhost", "[::1]")
 ANY_ADDRESS = ("0.0.0.0", "::", "")
 HTTP_PORT = 80
-"""Browsers leave this one out of Host and Origin."""
+"""Port that browsers omit from Host and Origin."""
 SHORTEST_TOKEN = 16
-"""Characters."""
+"""Minimum length of a token [characters]."""
 TOKEN_VARIABLE = "EXPLORER_TOKEN"
 TOKEN_KEY = "token"
 """Name of the token in an address."""
@@ -47,10 +47,10 @@ ASK_TOKEN = """<!doctype html><title>Token</title><meta name="viewport" content=
 """
 COOKIE_DAYS = 30
 ASK_AFTER, GIVE_UP_AFTER, CUT_AFTER = 20.0, 20.0, 10.0
-"""Seconds after which a browser is asked whether it still listens, in which it has to have said so, and in which it may
-say farewell: one that takes nothing of what it is sent is let go."""
+"""Seconds until a browser is pinged, until its answer is due, and allowed for closing: a browser that takes nothing of
+what it is sent is disconnected."""
 MOST_CONNECTIONS = 256
-"""Connections of any kind at one time; more are cut."""
+"""Simultaneous connections of any kind; further ones are closed."""
 
 
 class PortError(CommandError):
@@ -65,11 +65,10 @@ def guarded_server(
     channel: ShellChannel | None = None,
     token: str | None = None,
 ) -> GuardedServer:
-    """Server on ``host`` and ``port`` (0: a free one) that accepts pages which it served itself, and no
-    other.
+    """Server on ``host`` and ``port`` (0: a free one) that accepts only pages that it served itself.
 
-    ``pages`` are served beside viser's, ``channel`` talks to what stands around its page; both under the same rules.
-    ``token``: what a browser has to show; None: nothing, where only this machine can reach the page.
+    ``pages`` are served beside viser's; ``channel`` talks to what is around its page; both follow the same rules.
+    ``token``: token that a browser has to show; None: none, allowed if only this machine can reach the page.
 
     Raises PortError for a port that is busy or not allowed, for a host that is not of this machine, and for one that
     others can reach without a token.
@@ -97,7 +96,7 @@ def guarded_server(
 
     websockets.asyncio.server.serve = serve  # type: ignore[assignment, misc]
     try:
-        # viser prints a banner whatever ``verbose`` says; the address is for the caller to tell.
+        # viser prints a banner whatever ``verbose`` says; the caller prints the address.
         with contextlib.redirect_stdout(io.StringIO()):
             server = GuardedServer(host=host, port=port, label=label, verbose=False)
     finally:
@@ -113,13 +112,13 @@ def guarded_server(
 
 
 class GuardedServer(viser.ViserServer):
-    """viser's server behind the guard; ``token``: what a browser has to show, None where it is not asked for one."""
+    """viser's server behind the guard; ``token``: token that a browser has to show, None for none."""
 
     token: str | None = None
 
 
 class BoundedConnection(websockets.asyncio.server.ServerConnection):
-    """A connection that is cut at once where there are ``MOST_CONNECTIONS`` others."""
+    """A connection that is closed at once if there are ``MOST_CONNECTIONS`` others."""
 
     def connection_made(self, transport: Any) -> None:
         """Called by asyncio."""
@@ -138,7 +137,7 @@ def check_token(host: str, token: str | None) -> None:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this machine reaches ``host``."""
+    """Whether only this machine can reach ``host``."""
     try:
         return host == "localhost" or ipaddress.ip_address(host).is_loopback
     except ValueError:  # a name, which may mean any address
@@ -146,7 +145,7 @@ def is_loopback(host: str) -> bool:
 
 
 def _quiet_logger() -> logging.Logger:
-    """Of connections that were never opened, which anybody can make, there is nothing to tell."""
+    """A logger that ignores connections that were never opened, which anybody can make."""
     logger = logging.getLogger("explorer.page_server")
     logger.addFilter(_of_open_connections)
     return logger
@@ -162,7 +161,7 @@ def free_port(host: str, port: int) -> int:
         raise PortError(f"port {port} is outside 0 … 65535")
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as probe:
-        # As the server itself will do: connections of a server that has just ended do not block the port.
+        # As the server itself will do, so that connections of a server that has just ended do not block the port.
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((host, port))
@@ -182,7 +181,7 @@ def _for_hosts(
     hosts: Sequence[str], token: str | None, pages: WebPages | None, answer: Any
 ) -> Callable[[Any, Any], Any]:
     """The answer of ``pages``, or viser's ``answer`` (to an HTTP request or the opening of a WebSocket), for ``hosts``
-    and whoever knows the ``token``; 421 for others, 401 and a form for those without a token."""
+    and those who know the ``token``; 421 for other hosts, 401 and a form for those without a token."""
 
     def process_request(connection: Any, request: Any) -> Any:
         named = [name.lower() for name in request.headers.get_all("Host")]
@@ -199,7 +198,7 @@ def _for_hosts(
 
 
 def token_cookie(token: str) -> tuple[str, str]:
-    """Name and value of the cookie of pages with this token, on whatever port: recordings and tables have their own."""
+    """Name and value of the cookie of pages with this token, on any port: recordings and tables have their own."""
     value = hmac.new(token.encode(), b"page", sha256).hexdigest()
     return f"explorer_{sha256(token.encode()).hexdigest()[:8]}", value
 
@@ -214,7 +213,7 @@ def has_cookie(sent: Sequence[str], name: str, value: str) -> bool:
 
 
 def _login_response(connection: Any, request: Any, token: str) -> Any:
-    """To an address with the token: the cookie, and the same address without it. To others: a form for it."""
+    """For an address with the token: the cookie, and the same address without the token. For others: a form for it."""
     path, _, query = request.path.partition("?")
     asked = parse_qsl(query, keep_blank_values=True)
     given = [value for key, value in asked if key == TOKEN_KEY]
@@ -225,7 +224,7 @@ def _login_response(connection: Any, request: Any, token: str) -> Any:
     else:
         rest = urlencode([(key, value) for key, value in asked if key != TOKEN_KEY])
         response = connection.respond(HTTPStatus.SEE_OTHER, "")
-        # One slash: with two, what follows would be another server.
+        # One slash: with two, what follows would name another server.
         response.headers["Location"] = "/" + path.lstrip("/\\") + (f"?{rest}" if rest else "")
         kept = f"Max-Age={COOKIE_DAYS * 86400}; Path=/; HttpOnly; SameSite=Lax"
         response.headers["Set-Cookie"] = "=".join(token_cookie(token)) + f"; {kept}"
@@ -234,7 +233,7 @@ def _login_response(connection: Any, request: Any, token: str) -> Any:
 
 
 def allowed_hosts(host: str, port: int) -> list[str]:
-    """What a browser may call this server (``name:port``): its own names and addresses, in lower case."""
+    """Names (``name:port``) by which a browser may address this server: its own names and addresses, in lower case."""
     names = {*LOCAL_NAMES}
     if host in ANY_ADDRESS:
         names |= own_addresses()

@@ -1,9 +1,9 @@
-"""What a browser may say to viser: messages in their form, values that a control can have, files of a bounded size.
+"""What a browser may send to viser: well-formed messages, values that a control can have, files of bounded size.
 
-viser 1.1.1 takes any message of its protocol from anybody: it sets whatever attribute of a control a message names,
-casts whatever value, keeps a file of any size while it comes, sends some messages on to all other browsers and keeps
-those for ever. So each message is read here before viser does, and written anew; what a person at the page could not
-have sent is left out. A browser that sends faster than hands move is read more slowly.
+viser 1.1.1 accepts any message of its protocol from anybody: it sets any attribute of a control that a message names,
+casts any value, keeps a file of any size while it arrives, and forwards some messages to all other browsers and keeps
+those for ever. So each message is read here before viser reads it, and written again; what a user of the page could not
+have sent is dropped. A browser that sends faster than hands can move is read more slowly.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ from msgspec import Meta, Struct
 from viser import _messages
 
 MOST_SOCKETS = 32
-"""Sockets of pages at one time; a page has two."""
+"""Simultaneous sockets of pages; a page has two."""
 MESSAGES_PER_SECOND, MESSAGES_AT_ONCE = 250, 500
-"""Of one browser: a camera and a slider that are dragged send 60 each a second."""
+"""Limits per browser: a dragged camera and a dragged slider send 60 messages a second each."""
 MOST_MESSAGE_BYTES = 16_000_000
-"""A drawn picture is the largest; a file comes in parts of half a megabyte."""
+"""A rendered picture is the largest message; a file arrives in parts of half a megabyte."""
 MOST_QUEUED = 2
-"""Messages of a browser that are received and not read yet."""
+"""Messages of a browser that are received but not yet read."""
 MOST_UPLOAD_BYTES = 50_000_000
-"""Of a file, and of all files that one browser is sending; an archive is the largest that any control takes."""
+"""Limit for one file, and for all files that one browser is sending; the largest that a control takes is an archive."""
 MOST_UPLOADING_BYTES = 200_000_000
-"""Of all files that all browsers are sending."""
+"""Limit for all files that all browsers are sending."""
 SMALLEST_PART = 1024
-"""[bytes] Fewer and larger parts are sent of a file than parts of this size would be."""
+"""Smallest mean size of the parts of a file [bytes]: a file has no more parts than parts of this size would make."""
 LONGEST_TEXT = 20_000
 """Characters in a text box."""
 MOST_PIXELS = 4320 * 7680
-"""Of a picture that a browser draws."""
+"""Limit for a picture that a browser renders."""
 PNG_HEAD = re.compile(rb"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR(.{4})(.{4})", re.DOTALL)
 ROUNDING = 1e-9
-"""Share of a slider's range by which a browser's arithmetic may leave it."""
+"""Share of a slider's range by which rounding in a browser may exceed it."""
 
 MOST_WHOLE = 2**53
 """Largest whole number that a browser can tell from its neighbours."""
@@ -62,7 +62,7 @@ Value: TypeAlias = (
 
 
 class Camera(Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", tag="ViewerCameraMessage"):
-    """Where a browser looks from; viser counts a browser as present from the first one on."""
+    """The viewpoint of a browser; viser counts a browser as present from its first such message."""
 
     wxyz: tuple[Length, Length, Length, Length]
     position: Point
@@ -76,7 +76,7 @@ class Camera(Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", 
 
     @property
     def looks_somewhere(self) -> bool:
-        """Whether it has a direction, and knows which way is up."""
+        """Whether it has a direction of view and an upward direction."""
         away = sum((a - b) ** 2 for a, b in zip(self.position, self.look_at, strict=True))
         return away > 1e-12 and sum(x * x for x in self.up_direction) > 1e-12 and sum(x * x for x in self.wxyz) > 1e-12
 
@@ -111,7 +111,7 @@ class Key(Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", tag
 
 
 class UploadStart(Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", tag="FileTransferStartUpload"):
-    """A file is about to come. Its name is a label and no path: :mod:`explorer.files.uploads`."""
+    """A file is about to arrive. Its name is a label, not a path: :mod:`explorer.files.uploads`."""
 
     source_component_uuid: Id
     transfer_uuid: Id
@@ -131,7 +131,7 @@ class UploadPart(Struct, frozen=True, forbid_unknown_fields=True, tag_field="typ
 
 
 class Picture(Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", tag="GetRenderResponseMessage"):
-    """The scene as a browser has drawn it, PNG."""
+    """The scene as a browser has rendered it, PNG."""
 
     payload: bytes
     render_uuid: Id
@@ -148,12 +148,12 @@ READER: msgspec.msgpack.Decoder[ClientMessage] = msgspec.msgpack.Decoder(ClientM
 
 
 class Refusal(Exception):
-    """A message that a person might have meant; one line for that browser."""
+    """A refused message that the user may have intended; one line for that browser."""
 
 
 @dataclass
 class Upload:
-    """A file that is on its way."""
+    """A file that is arriving."""
 
     source: str
     size: int
@@ -163,7 +163,7 @@ class Upload:
 
 
 class RateLimit:
-    """Makes whoever sends faster than ``MESSAGES_PER_SECOND`` wait: what is not read, TCP holds back."""
+    """Makes senders faster than ``MESSAGES_PER_SECOND`` wait: TCP holds back what is not read."""
 
     def __init__(self) -> None:
         self._allowed, self._since = float(MESSAGES_AT_ONCE), time.monotonic()
@@ -178,7 +178,7 @@ class RateLimit:
 
 
 class Incoming:
-    """All browsers of a page, and what is read of each. ``server`` is set once it is there."""
+    """All browsers of a page, and what is read from each. ``server`` is set once it exists."""
 
     def __init__(self) -> None:
         self.server: viser.ViserServer | None = None
@@ -186,11 +186,11 @@ class Incoming:
 
     @property
     def uploading(self) -> int:
-        """[bytes] of files of all browsers that are not whole yet."""
+        """Bytes of incomplete files of all browsers."""
         return sum(one.uploading for one in self._connections)
 
     async def handle(self, connection: Any, handler: Callable[[Any], Awaitable[None]]) -> None:
-        """Let viser's ``handler`` talk to the browser behind ``connection`` until that goes."""
+        """Let viser's ``handler`` talk to the browser behind ``connection`` until it disconnects."""
         one = FilteredConnection(connection, self)
         self._connections.append(one)
         try:
@@ -199,13 +199,13 @@ class Incoming:
             self._connections.remove(one)
 
     def control(self, uuid: str) -> Any:
-        """The control with this id that a person could use now; None where there is none."""
+        """The control with this id that the user could operate now; None if there is none."""
         found = None if self.server is None else self.server.gui._gui_input_handle_from_uuid.get(uuid)
-        # What has no switch to disable it, such as a progress bar, is no control of a person's.
+        # What cannot be disabled, such as a progress bar, is not a control for the user.
         return None if found is None or found._impl.removed or getattr(found, "disabled", True) else found
 
     def serve(self, server: viser.ViserServer) -> None:
-        """Begin with ``server``: what has arrived of a file is told to its browser alone, and not kept for others."""
+        """Begin with ``server``: progress of an upload is sent only to its own browser, and not kept for others."""
         self.server, to_all = server, server._websock_server.queue_message
 
         def queue(message: Any) -> None:
@@ -221,26 +221,26 @@ class Incoming:
 
 
 class FilteredConnection:
-    """A connection of which viser reads only what a person at the page could have sent."""
+    """A connection from which viser reads only what a user of the page could have sent."""
 
     def __init__(self, connection: Any, incoming: Incoming) -> None:
         self._connection, self._incoming, self._pace = connection, incoming, RateLimit()
         self._present = False
         self._uploads: dict[str, Upload] = {}
         self.sent: list[str] = []
-        """Ids of the last files that it sent."""
+        """Ids of the last files that this browser sent."""
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._connection, name)
 
     @property
     def uploading(self) -> int:
-        """[bytes] of its files that are not whole yet."""
+        """Bytes of its incomplete files."""
         return sum(upload.size for upload in self._uploads.values())
 
     @property
     def client(self) -> viser.ClientHandle | None:
-        """viser's handle of this browser, once it has told its camera."""
+        """viser's handle of this browser, once it has sent its camera."""
         server = self._incoming.server
         if server is None:
             return None
@@ -249,7 +249,7 @@ class FilteredConnection:
         return None if number is None else server.get_clients().get(number)
 
     async def recv(self) -> bytes:
-        """The next message for viser, in the form in which viser reads it."""
+        """The next message for viser, in the form that viser reads."""
         while True:
             raw = await self._connection.recv()
             await self._pace.wait()
@@ -259,17 +259,17 @@ class FilteredConnection:
                 if (client := self.client) is not None:
                     client.add_notification("Not taken", str(refusal), auto_close_seconds=10.0)
             except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
-                pass  # nothing that viser's page sends
+                pass  # not something that viser's page sends
             else:
                 if said is not None:
                     return msgspec.msgpack.encode(said)
 
     def _accepted(self, said: ClientMessage) -> ClientMessage | None:
-        """``said`` as viser may read it; None for what is left out. Raises Refusal."""
+        """``said`` as viser may read it; None if it is dropped. Raises Refusal."""
         if isinstance(said, Camera):
             self._present |= said.looks_somewhere
             return said if said.looks_somewhere else None
-        if not self._present:  # what such a browser leaves behind, viser would keep
+        if not self._present:  # viser would keep what such a browser leaves behind
             return None
         match said:
             case Update(uuid=uuid, updates=updates):
@@ -287,7 +287,7 @@ class FilteredConnection:
         return said
 
     def _announced(self, start: UploadStart) -> UploadStart | None:
-        """Make room for a file. Raises Refusal where there is none."""
+        """Make room for a file. Raises Refusal if there is none."""
         control = self._incoming.control(start.source_component_uuid)
         if not isinstance(control, viser.GuiUploadButtonHandle) or start.transfer_uuid in (*self._uploads, *self.sent):
             return None
@@ -304,7 +304,7 @@ class FilteredConnection:
         return start
 
     def _taken_in(self, part: UploadPart) -> UploadPart | None:
-        """A part that is still wanted, and no larger than what is left of its file."""
+        """``part`` if it is still wanted and no larger than the rest of its file; else None."""
         upload = self._uploads.get(part.transfer_uuid)
         if upload is None or part.source_component_uuid != upload.source or part.part_index not in upload.parts_left:
             return None
@@ -318,7 +318,7 @@ class FilteredConnection:
 
 
 def valid_value(control: Any, value: Any) -> Any:
-    """``value`` as ``control`` may have it: of its type, within its bounds, one of its options; None for another."""
+    """``value`` if ``control`` may have it (its type, within its bounds, one of its options); else None."""
     match control:
         case viser.GuiUploadButtonHandle():
             return None
@@ -343,7 +343,7 @@ def valid_value(control: Any, value: Any) -> Any:
 
 
 def _number(value: Any, kind: type, low: float | None, high: float | None) -> float | int | None:
-    """``value`` as a finite number of ``kind`` from ``low`` to ``high``; None where it is none."""
+    """``value`` as a finite number of ``kind`` from ``low`` to ``high``; None if it is not one."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         return None
     if kind is int and (value != round(value) or abs(value) > MOST_WHOLE):

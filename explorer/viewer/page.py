@@ -1,10 +1,10 @@
-"""The page: one loop that takes actions, asks the session, and shows the panels what there is. They do the rest.
+"""The page: one loop that takes actions, asks the session, and passes its state to the panels, which do the rest.
 
 Several browsers share one pour. viser tells a callback who moved a control, but a change comes back from the solver's
-process later, and on a busy machine much later; so every message of a browser is noted as it arrives, and a change is
-signed by the browser that sent one last. What people asked for beside parameters (another pour, a study, a diagnosis)
-becomes an event that every browser sees. The handlers are private names of viser, which is why it is pinned and a test
-watches them.
+process later, on a busy machine much later. So every message of a browser is noted as it arrives, and a change is
+attributed to the browser that sent one last. What users asked for apart from parameters (another pour, a study, a
+diagnosis) becomes an event that every browser sees. The handlers are private names of viser; therefore viser is pinned
+and a test watches them.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ from explorer.viewer.shell.web_pages import WebPages
 from explorer.viewer.view import DARK, apply_theme, light
 
 ACTS = (_messages.GuiUpdateMessage, _messages.CommandTriggerMessage)
-"""Messages by which a person acts."""
+"""Messages by which a user acts."""
 ASKED_FOR = ("running", "paused", "cancelled")
-"""States of a command that somebody's hand brings about; it ends in the others by itself."""
+"""States of a command that a user brings about; it reaches the others by itself."""
 EVENTS_REMEMBERED = 1000
 CONTROLS_WIDTH, STUDY_WIDTH = 320, 560
-"""Of the panels right and left of the scene [px]; a browser may draw them wider."""
+"""Widths of the panels right and left of the scene [px]; a browser may draw them wider."""
 FRAME_INTERVAL = 1.0 / 36.0
-"""Seconds between two looks at the newest frame: 30 a second are promised, and some come late or bring nothing new."""
+"""Seconds between two checks for a new frame: 30 a second are promised, and some are late or bring nothing new."""
 
 
 class Page:
@@ -84,7 +84,7 @@ class Page:
             server, session, post, study, diagnosis, data_folder(), bar, project, channel, pages, place or PourPlace()
         )
         self.panels = {panel.name: panel for panel in self._made()}
-        """By name, in their order on the page."""
+        """Panels by name, in their order on the page."""
         self._due = dict.fromkeys((OFTEN, SELDOM, *(panel.every for panel in self.panels.values())), 0.0)
         channel.tell("keys", named_keys(server.gui))
         channel.offer("theme", lambda _: post(self._switch_theme))
@@ -92,7 +92,7 @@ class Page:
         self._switch_theme()
 
     def _made(self) -> Iterator[Panel]:
-        """Make the panels that this page has, each in its place."""
+        """Make the panels of this page, each in its place."""
         gui, kinds = self._server.gui, [kind for kind in PANELS.values() if kind.offered(self._context)]
         controls, study = gui.add_tab_group(), self._context.study_panel
         gui.main_panel.dock_right()
@@ -116,7 +116,7 @@ class Page:
             panel.set_dark(self._dark)
 
     def close(self) -> None:
-        """End what panels have started: a second pour, and a recording, with its file whole."""
+        """End what panels have started: a second pour, and a recording, with a complete file."""
         for panel in self.panels.values():
             panel.close()
         self._context.tables.close()
@@ -134,7 +134,7 @@ class Page:
             self._forget_what_comes_later(status)
             preview = None if frame is not None else self._previewed(status)
             if frame is not None:
-                # Before it is drawn: a playback keeps the messages to browsers, and the time between them.
+                # Before drawing: a playback keeps the messages to browsers and the time between them.
                 self._record(frame, status)
             with self._server.atomic():
                 now = Now(status, frame or preview, self._events, self._notice, preview is not None)
@@ -142,11 +142,11 @@ class Page:
             frames.wait(stop)
 
     def _without_folder(self, notice: str) -> str:
-        """``notice`` with a file that was sent called as it is in the lists: its folder says nothing to who sent it."""
+        """``notice`` with an uploaded file named as in the lists: its folder means nothing to the user who sent it."""
         return notice.replace(f"{self._context.uploads}{os.sep}", "")
 
     def _record(self, frame: Frame, status: Status) -> None:
-        """Hand on what is shown; a recorder that cannot go on, with its folder gone, is told and left out."""
+        """Hand on what is shown; a recorder that cannot continue (its folder is gone) is reported and dropped."""
         for recorder in (*self._recorders, self._context.recording):
             try:
                 recorder.take(frame, status)
@@ -155,11 +155,11 @@ class Page:
                 self._recorders = tuple(one for one in self._recorders if one is not recorder)
 
     def _previewed(self, status: Status) -> Frame | None:
-        """A frame of the recording of this very pour, while the solver loads."""
+        """A frame of the recording of exactly this pour, while the solver loads."""
         if self._preview is None or status.state != SessionState.STARTING or status.generation != 1:
             return None
         if self._preview_since is None and not self._server.get_clients():
-            return None  # it begins when somebody looks
+            return None  # it begins when somebody is watching
         self._preview_since = self._preview_since or time.monotonic()
         return self._preview.frame(time.monotonic() - self._preview_since, status.generation)
 
@@ -169,12 +169,12 @@ class Page:
         self._time = status.time
 
     def _show(self, now: Now, news: bool) -> None:
-        """Let all panels draw, and those show whose time has come."""
+        """Let all panels draw, and let those show that are due."""
         panels, began = self.panels.values(), time.monotonic()
         for panel in panels:
             panel.draw(now)
         for every, due in self._due.items():
-            # A change that the solver has taken over is told at once: somebody's hand is on the slider.
+            # A change that the solver has applied is shown at once: a user is moving the slider.
             if began < due and not (news and every <= OFTEN):
                 continue
             self._due[every] = began + every
@@ -186,7 +186,7 @@ class Page:
 
 
 def named_keys(gui: viser.GuiApi) -> list[tuple[str, str]]:
-    """Keys of the page's commands with what they do."""
+    """Keys of the page's commands, with what they do."""
     commands = [handle._impl.props for handle in gui._command_handle_from_uuid.values()]
     return [("+".join(key if isinstance(key, tuple) else (key,)), one.label) for one in commands if (key := one.hotkey)]
 
@@ -198,7 +198,7 @@ class People:
         self._server = server
         self._last: int | None = None
         for kind in ACTS:
-            # Before viser's own, which hands the act on to the page's loop: who it was has to be known by then.
+            # Before viser's own handler, which passes the act to the page's loop: by then it must be known who acted.
             server._websock_server._incoming_handlers.setdefault(kind, []).insert(0, self._acted)
 
         @server.on_client_connect
@@ -212,11 +212,11 @@ class People:
 
     @property
     def present(self) -> int:
-        """How many browsers are at the page."""
+        """Number of browsers at the page."""
         return len(self._server.get_clients())
 
     def signed(self, event: Event) -> Event:
-        """``event``, a change or an order with the browser behind its text where there are several."""
+        """``event``; a change or an order gets the browser after its text if there are several."""
         if not (event.is_change or event.is_order) or self.present < 2 or self._last is None:
             return event
         return replace(event, text=f"{event.text} · browser {self._last}")
@@ -235,7 +235,7 @@ def browser_number(client_id: int) -> int:
 
 
 class OrderEvents:
-    """Tells of what is there and was not the last time; ``commands``: name → what runs in the background."""
+    """Reports what has changed since the last call; ``commands``: name → what runs in the background."""
 
     def __init__(self, commands: Mapping[str, BackgroundOrders]) -> None:
         self._commands = dict(commands)
@@ -243,14 +243,14 @@ class OrderEvents:
         self._generation: int | None = None
 
     def of_the_pour(self, status: Status) -> Iterator[Event]:
-        """A pour other than the last time; the first one is nobody's order."""
+        """A pour other than at the last call; the first one was not ordered by anybody."""
         before, self._generation = self._generation, status.generation
         if before not in (None, status.generation):
             text = f"poured anew: {status.scene.rig.name}, seed {status.seed}"
             yield Event(status.generation, 0.0, text, is_order=True)
 
     def in_the_background(self, status: Status) -> Iterator[Event]:
-        """Commands that are in another state than the last time."""
+        """Commands whose state differs from that at the last call."""
         for name, command in self._commands.items():
             before, now = self._states[name], command.status().state
             self._states[name] = now

@@ -1,9 +1,9 @@
 """Colours of the page: of components, of lines, of charts.
 
-Those of bodies and of lines begin with Okabe & Ito (2008). Their seven are nearer to each other than one would like
-(two of them 16 in CIELAB for tritanopes), and two are too pale for lines on white. They are moved as little as it
-takes: any two are told apart with every common form of colour blindness, and lines are seen on a light and on a dark
-page (a test holds both).
+The colours of bodies and lines start from Okabe & Ito (2008). Some of their seven are too similar (two of them 16 apart
+in CIELAB for tritanopes), and two are too pale for lines on white. They are shifted as little as necessary: any two can
+be told apart with every common form of colour blindness, and lines are visible on a light and on a dark page (a test
+checks both).
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ PLATE: Colour = (74, 82, 92)
 RING: Colour = (110, 122, 135)
 
 TEXT: Colour = (214, 221, 228)
-"""What is written on the plate."""
+"""Text on the plate."""
 
 BRAND, BRAND_ON_WHITE = (86, 150, 200), (31, 110, 165)
-"""Buttons and what is chosen, on a dark and on a light page: 4.5 : 1 at least as text on either."""
+"""Buttons and selected items, on a dark and on a light page: contrast at least 4.5 : 1 as text on either."""
 
 VIRIDIS: tuple[Colour, ...] = (
     (68, 1, 84),
@@ -49,17 +49,17 @@ VIRIDIS: tuple[Colour, ...] = (
     (181, 222, 43),
     (253, 231, 37),
 )
-"""Ten even steps of viridis (van der Walt & Smith 2015): its lightness alone tells the order."""
+"""Ten even steps of viridis (van der Walt & Smith 2015): its lightness alone shows the order."""
 
 SELECTED: Colour = (255, 255, 255)
 
 STILL: Colour = (206, 210, 214)
-"""Bodies of which a coloured quantity has nothing to tell: at rest, without contact."""
+"""Bodies for which a coloured quantity says nothing: at rest, without contact."""
 
 CORE: Colour = (255, 255, 255)
 
 HALO: Colour = (16, 18, 22)
-"""Rim of the lines in the scene: with it they are seen before bodies, plate and page, dark or light."""
+"""Rim of the lines in the scene, which makes them visible against bodies, plate and page, dark or light."""
 
 SRGB_GAMMA = 2.2
 
@@ -86,7 +86,7 @@ AXIS_TEXT = "#9aa4ae"
 GRID_LINE = "rgba(160, 170, 180, 0.15)"
 
 DARK = True
-"""How the page begins."""
+"""Whether the page is dark at first."""
 
 
 def component_colour(k: int) -> Colour:
@@ -95,13 +95,13 @@ def component_colour(k: int) -> Colour:
 
 
 def linear(colour: Colour) -> Colour:
-    """The colour as viser 1.1.1 wants it for batched meshes: it takes those numbers as linear light, not as sRGB."""
+    """The colour for batched meshes in viser 1.1.1, which takes those numbers as linear light, not as sRGB."""
     red, green, blue = (round(255.0 * (channel / 255.0) ** SRGB_GAMMA) for channel in colour)
     return red, green, blue
 
 
 def css(colour: Colour) -> str:
-    """The colour as CSS writes it."""
+    """The colour in CSS notation."""
     return f"rgb({colour[0]}, {colour[1]}, {colour[2]})"
 
 
@@ -111,7 +111,7 @@ def linear_all(colours: npt.NDArray[np.float64]) -> npt.NDArray[np.uint8]:
 
 
 def mapped(share: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Colours of viridis (0 … 255, sRGB) for shares of a range, 0 … 1 (what is beyond has its end), shape (n, 3)."""
+    """Colours of viridis (0 … 255, sRGB) for shares of a range, clipped to 0 … 1, shape (n, 3)."""
     stops = np.linspace(0.0, 1.0, len(VIRIDIS))
     channels = np.array(VIRIDIS, dtype=float).T
     return np.column_stack([np.interp(share, stops, channel) for channel in channels])

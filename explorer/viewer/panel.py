@@ -1,4 +1,4 @@
-"""What a panel of the page is: its protocol, the tabs, what it is made with, and what it is shown.
+"""Panels of the page: their protocol, the tabs, what panels are made with, and what they are shown.
 
 A new panel is a class in a file of its own and a line in ``panels.py``, or an entry point ``panel.NAME`` of a package.
 """
@@ -35,23 +35,23 @@ from explorer.viewer.tables.sheet_page import SheetInHand
 from explorer.viewer.tables.table_server import TableServer
 
 OFTEN, SELDOM = 0.2, 0.5
-"""Seconds between two looks of a panel: at the pour, and at what runs in the background."""
+"""Seconds between two updates of a panel: for the pour, and for what runs in the background."""
 
 
 class Place(Enum):
-    """Where a tab stands on the page."""
+    """The place of a tab on the page."""
 
     CONTROLS = auto()
     """Right of the scene, narrow: what acts on the pour and on how it is drawn."""
     STUDY = auto()
-    """Left of the scene, wide, folded away at first: measurement, studies, reports."""
+    """Left of the scene, wide, collapsed at first: measurement, studies, reports."""
     AROUND = auto()
-    """No tab: the state line above the page and the timeline below it."""
+    """Not in a tab: the state line above the page and the timeline below it."""
 
 
 @dataclass(frozen=True)
 class Tab:
-    """A tab of the page; those of the same name and place are one."""
+    """A tab of the page; tabs with the same name and place are one."""
 
     name: str
     place: Place = Place.STUDY
@@ -65,12 +65,12 @@ POUR, CALIBRATE, DIAGNOSE, LABORATORY, REPORTS = (
     Tab(room) for room in (Room.POUR, Room.CALIBRATE, Room.DIAGNOSE, Room.LABORATORY, Room.REPORTS)
 )
 TABS = (CONTROLS, SET_UP, LOOK, EXPORT, POUR, CALIBRATE, DIAGNOSE, LABORATORY, REPORTS)
-"""In order; another one that a panel names comes after them."""
+"""Tabs in order; further ones that panels name come after them."""
 
 
 @dataclass(frozen=True)
 class PageContext:
-    """What panels are made with, and what they have in common."""
+    """What panels are made with and share."""
 
     server: GuardedServer
     session: Session
@@ -78,42 +78,42 @@ class PageContext:
     study: StudyProcess
     diagnosis: DiagnosisProcess
     data: Path
-    """Folder of what the user made: presets, uploads, recordings."""
+    """Folder of the user's data: presets, uploads, recordings."""
     colour_bar: viser.GuiHtmlHandle
     """Explains the colours of bodies, beside every tab."""
     project: Project
-    """What the page works on."""
+    """The project that the page works on."""
     channel: ShellChannel
-    """To the state line and the timeline."""
+    """Channel to the state line and the timeline."""
     pages: WebPages
     """Pages beside this one."""
     place: PourPlace = field(default_factory=PourPlace)
-    """Where studies, diagnoses and further pours are made."""
+    """Where studies, diagnoses and further pours run."""
 
     @property
     def uploads(self) -> Path:
-        """Folder of the files that browsers sent."""
+        """Folder of uploaded files."""
         return self.data / "uploads"
 
     def pour_text(self) -> str:
-        """What is on the screen with its moment, as a link holds it. Raises CommandError where a link cannot."""
+        """The pour on the screen and its moment, as text for a link. Raises CommandError if a link cannot hold it."""
         status = self.session.status()
         text = pour_text(self.session.source, status.scene, status.seed, self.project.source)
         return f"{text}&time={status.time!r}"
 
     @cached_property
     def study_panel(self) -> viser.PanelHandle:
-        """Left of the scene, with the tabs of ``Place.STUDY``."""
+        """The panel left of the scene, with the tabs of ``Place.STUDY``."""
         return self.server.gui.add_panel()
 
     @cached_property
     def background(self) -> BackgroundWork:
-        """Work about the pour and its files that takes seconds."""
+        """Runs work on the pour and its files that takes seconds."""
         return BackgroundWork(self.post)
 
     @cached_property
     def bench_work(self) -> BackgroundWork:
-        """Work of the laboratory, beside the other."""
+        """Runs work of the laboratory, independently of the other."""
         return BackgroundWork(self.post)
 
     @cached_property
@@ -123,7 +123,7 @@ class PageContext:
 
     @cached_property
     def sheet(self) -> SheetInHand:
-        """The sheet of a designed experiment that is filled in and analysed."""
+        """The sheet of a designed experiment that is being filled in and analysed."""
         return SheetInHand()
 
     @cached_property
@@ -133,7 +133,7 @@ class PageContext:
 
     @cached_property
     def recording(self) -> RecordingSwitch:
-        """Recordings that are begun and ended on the page."""
+        """The recordings that are begun and ended on the page."""
         return RecordingSwitch(self.server, self.data / "recordings", self.background)
 
     @cached_property
@@ -154,46 +154,46 @@ class PageContext:
 
 @dataclass(frozen=True)
 class Now:
-    """What there is to show in one turn of the page's loop."""
+    """What there is to show in one iteration of the page's loop."""
 
     status: Status
     frame: Frame | None = None
-    """The newest one; None before a body has entered."""
+    """The newest frame; None before a body has entered."""
     events: Sequence[Event] = ()
     notice: str = ""
     """The page's own last message, such as a refused click."""
     previewed: bool = False
-    """Whether ``frame`` is of a recording that is shown while the solver loads."""
+    """Whether ``frame`` is from a recording that is shown while the solver loads."""
 
 
 class Panel:
-    """A block of controls; derive from this one. What a panel leaves as it is here does nothing."""
+    """A block of controls, to be subclassed. Methods that a subclass does not override do nothing."""
 
     name: str
     tab: Tab
     title: str = ""
-    """Of the folder in the tab that it stands in; without one it stands in the tab itself."""
+    """Title of the panel's folder in its tab; without one, the panel is in the tab itself."""
     folded: bool = True
     """Whether that folder is closed at first."""
     every: float = OFTEN
-    """Seconds between two calls of :meth:`show`; where they are no more than ``OFTEN``, also after every change."""
+    """Seconds between two calls of :meth:`show`; if no more than ``OFTEN``, it is also called after every change."""
 
     def __init__(self, page: PageContext) -> None:
-        """Make the controls; tab and folder are open."""
+        """Make the controls, inside the panel's tab and folder."""
 
     @classmethod
     def offered(cls, page: PageContext) -> bool:
-        """Whether this page has it."""
+        """Whether this page has the panel."""
         return True
 
     def draw(self, now: Now) -> None:
-        """Move what moves, and miss nothing: some 30 times a second, inside ``server.atomic()``."""
+        """Draw everything that moves, without omission: some 30 times a second, inside ``server.atomic()``."""
 
     def show(self, now: Now) -> None:
-        """Tell what is new, inside ``server.atomic()``; what is shown already is left alone."""
+        """Show what is new, inside ``server.atomic()``; what is already shown is left alone."""
 
     def set_dark(self, dark: bool) -> None:
-        """Follow the page: dark, or light."""
+        """Adapt to a dark or a light page."""
 
     def close(self) -> None:
         """End what the panel has started."""

@@ -24,19 +24,19 @@ from solver.scenes.scene import Scene, body_counts
 Array = npt.NDArray[np.float64]
 
 FINE = 2000
-"""Bodies of a component up to which each is drawn with all its faces, however far it is."""
+"""Number of bodies of a component up to which each is drawn with all its faces, however far away it is."""
 RING_SPACING = 0.05
-"""Circles on the plate, a scale for the eye [m]."""
+"""Spacing of the circles on the plate, which serve as a scale [m]."""
 PLATE_RADIUS = 0.2
-"""Radius of the disc that stands for the infinite plate [m]; where a body lies farther out, it is larger."""
+"""Radius of the disc that represents the infinite plate [m]; it is larger if a body lies farther out."""
 PLATE_MARGIN = 0.01
-"""The plate goes on for at least this behind the centre of the farthest body [m]."""
+"""The plate extends at least this far beyond the centre of the farthest body [m]."""
 TEXT_AT, BAR_AT = math.radians(-38.0), math.radians(-74.0)
-"""Azimuths of the radii that are written at the circles, and of the scale bar: in front of a camera as it begins."""
+"""Azimuths of the radii written at the circles, and of the scale bar: in front of a camera in its initial view."""
 TEXT_HEIGHT, TEXT_PIXELS = 15e-3, 64
-"""Of what is written on the plate: height of a line [m], and pixels for it."""
+"""Text on the plate: height of a line [m], and its pixels."""
 STRETCHED = 1.6
-"""Letters are higher than wide by this, as on a road: they are mostly seen at a low angle."""
+"""Factor by which letters are stretched, as on a road: they are mostly seen at a low angle."""
 BAR_LENGTH, BAR_RADIUS, BAR_THICKNESS = 0.05, 0.14, 2e-3
 """The scale bar on the plate and its distance from the axis [m]."""
 CORNERS = 72
@@ -46,7 +46,7 @@ LINE = 8e-4
 TUBE_SIDES, RIM_WIDER = 8, 1.5
 """Sides of a tube, and the radius of its rim as a multiple of its own."""
 CLEAR, OPACITY = 0.16, {GATE_NAME: 0.5}
-"""Opacity of what one has to look through: all surfaces but the plate."""
+"""Opacity of what one has to look through: all surfaces except the plate."""
 
 
 class SceneNodes:
@@ -56,7 +56,7 @@ class SceneNodes:
         self.meshes = [body_triangles(body) for body in scene.bodies]
         """Surface of a body of each component, in its own frame."""
         self.widest = math.inf
-        """Largest radius of the plate [m], whatever lies farther out: where another one stands beside it."""
+        """Largest radius of the plate [m], whatever lies farther out; set if another pile stands beside it."""
         numbers = body_counts(scene)
         self.bodies = BodyNodes(
             server,
@@ -72,7 +72,7 @@ class SceneNodes:
         self._plate = DrawnPlate(server, self._rig[PLATE_NAME], root) if PLATE_NAME in self._rig else None
 
     def show(self, frame: Frame, seen: npt.NDArray[np.bool_] | None = None) -> None:
-        """Move bodies and surfaces to where ``frame`` has them; call it inside ``server.atomic()``.
+        """Move bodies and surfaces to their places in ``frame``; call it inside ``server.atomic()``.
 
         ``seen`` says which bodies are drawn, shape (n,); by default all that are in the domain.
         """
@@ -87,14 +87,14 @@ class SceneNodes:
             self._rig[name].opacity = opacity
 
     def clear(self) -> None:
-        """Hide all bodies, surfaces where they were: a new pour has not begun to fall yet."""
+        """Hide all bodies and leave surfaces where they are: a new pour has not begun to fall yet."""
         self._show_surfaces(self._at_first)
         if self._plate is not None:
             self._plate.reach(PLATE_RADIUS)
         self.bodies.clear()
 
     def _show_surfaces(self, poses: Array) -> None:
-        """Move those surfaces whose pose has changed; ``poses`` as in ``rig_poses``, or empty where none is known."""
+        """Move those surfaces whose pose has changed; ``poses`` as in ``rig_poses``, or empty if none are known."""
         if poses.shape != self._surfaces.shape:
             return
         for name, pose, before in zip(self._surface_names, poses, self._surfaces, strict=True):
@@ -117,7 +117,7 @@ class SceneNodes:
 
 
 class DrawnPlate:
-    """The disc that stands for the infinite plate, its mesh in ``disc``; circles, their radii and a bar as a scale."""
+    """The disc that represents the infinite plate, its mesh in ``disc``; circles, their radii and a bar as a scale."""
 
     def __init__(self, server: viser.ViserServer, disc: Any, root: str = "") -> None:
         self._server, self._disc, self._root = server, disc, root
@@ -134,7 +134,7 @@ class DrawnPlate:
         self._size()
 
     def reach(self, radius: float) -> None:
-        """Make it as large as ``radius`` [m]; call it inside ``server.atomic()``."""
+        """Enlarge or shrink the plate to ``radius`` [m]; call it inside ``server.atomic()``."""
         if radius != self._radius:
             self._radius = radius
             self._rings.points = rings(radius).astype(np.float32)
@@ -167,14 +167,14 @@ class DrawnPlate:
             format="png",
             cast_shadow=False,
             receive_shadow=False,
-            # viser's images face downward; so half a turn about their own x axis, then one about z.
+            # viser's images face downward, hence half a turn about their own x axis, then a turn about z.
             wxyz=(0.0, math.cos(half), math.sin(half), 0.0),
             position=(radius * math.cos(azimuth), radius * math.sin(azimuth), LINE),
         )
 
 
 def text_pixels(text: str) -> npt.NDArray[np.uint8]:
-    """``text`` in the colour of the scale on nothing, as RGBA, shape (TEXT_PIXELS, width, 4)."""
+    """``text`` in the colour of the scale on a transparent ground, as RGBA, shape (TEXT_PIXELS, width, 4)."""
     font = ImageFont.load_default(0.8 * TEXT_PIXELS)
     left, _, right, _ = font.getbbox(text)
     image = Image.new("RGBA", (math.ceil(right - left), TEXT_PIXELS), (*TEXT, 0))
@@ -195,14 +195,14 @@ def ring_count(radius: float) -> int:
 
 def rings(radius: float) -> Array:
     """The circles on a plate of this radius [m] as line segments, shape (n, 2, 3)."""
-    # Above the plate by the lines' thickness, so that they are not lost in it.
+    # Above the plate by the lines' thickness, so that they do not vanish in it.
     return np.concatenate([circle(k * RING_SPACING, LINE) for k in range(1, ring_count(radius) + 1)])
 
 
 class Tubes:
-    """Lines in the scene as thick as their numbers say, each with a dark rim: legible before anything.
+    """Lines in the scene with given thickness, each with a dark rim: visible against anything.
 
-    The rim is a wider tube of which only the far inside is drawn, so it stands out on both sides of the line.
+    The rim is a wider tube of which only the far inner side is drawn, so it shows on both sides of the line.
     """
 
     def __init__(self, server: viser.ViserServer, name: str, colour: Colour) -> None:
@@ -263,7 +263,7 @@ def tube_places(
     along = segments[:, 1] - segments[:, 0]
     length = np.linalg.norm(along, axis=1)
     x, y, z = (along / np.where(length > 0.0, length, 1.0)[:, None]).T
-    # Half way from z to the direction; one that points straight down is half a turn about x.
+    # Half way from z to the direction; for a direction straight down, half a turn about x.
     turn = np.column_stack([1.0 + z, -y, x, np.zeros(n)])
     turn[1.0 + z < 1e-9] = (0.0, 1.0, 0.0, 0.0)
     poses.position[:n] = segments.mean(axis=1)
@@ -274,8 +274,7 @@ def tube_places(
 
 
 def another_set_up(one: Scene, other: Scene) -> bool:
-    """Whether bodies or rig are others: they are drawn by other nodes, and their piles are not held against each
-    other."""
+    """Whether bodies or rig differ: they are then drawn by other nodes, and their piles are not compared."""
     return (one.bodies, one.rig) != (other.bodies, other.rig)
 
 
@@ -290,13 +289,13 @@ class BodyNodes:
         ]
 
     def show(self, frame: Frame, seen: npt.NDArray[np.bool_] | None = None) -> None:
-        """Move the bodies to where ``frame`` has them; ``seen`` as in :func:`component_poses`."""
+        """Move the bodies to their places in ``frame``; ``seen`` as in :func:`component_poses`."""
         for k, node, kind in self._there():
             _place(node, component_poses(frame, k, kind.most, seen))
 
     def plain(self, frame: Frame) -> npt.NDArray[np.uint8]:
-        """Colours by component of the bodies of ``frame``, as :meth:`paint` wants them, shape (n, 3)."""
-        # The last frame of the scene before may hold more components than this one has.
+        """Colours by component of the bodies of ``frame``, in the form that :meth:`paint` takes, shape (n, 3)."""
+        # The last frame of the previous scene may hold more components than this one.
         return self._colours[frame.component % len(self._colours)]
 
     def paint(self, frame: Frame, colours: npt.NDArray[np.uint8]) -> None:
@@ -329,7 +328,7 @@ class BodyNodes:
 
 @dataclass(frozen=True, eq=False)
 class DrawnComponent:
-    """One component: its mesh, its colour, and how many of it there can be."""
+    """One component: its mesh, its colour, and its largest number of bodies."""
 
     mesh: BodyMesh
     colour: Colour
@@ -374,7 +373,7 @@ def _place(node: Any, poses: InstancePoses) -> None:
 
 @dataclass(frozen=True)
 class InstancePoses:
-    """Instances of one component as viser wants them; bodies that are not in the scene have scale 0."""
+    """Instances of one component in viser's form; bodies that are not in the scene have scale 0."""
 
     position: npt.NDArray[np.float32]
     """[m], shape (n, 3)."""

@@ -45,7 +45,7 @@ DASHES = ("solid", "dash", "dot")
 
 
 def design_plots(result: DesignResult) -> Plots:
-    """Those of a study's surface, then single runs, Box–Cox profile and ridge; without a model those of its kind."""
+    """Charts of a study's surface, then single runs, Box–Cox profile and ridge; without a model, those of its kind."""
     model, fitted = result.analysis.model, result.fitted
     if model is None or fitted is None:
         return dict(_plots_without_model(result))
@@ -63,7 +63,7 @@ def design_plots(result: DesignResult) -> Plots:
 
 
 def _plots_without_model(result: DesignResult) -> Iterator[tuple[str, Plot]]:
-    """The chart of elementary effects, names or random groups, as in their sections of the report."""
+    """The chart of elementary effects, names or random groups, as in its section of the report."""
     found = result.analysis
     if found.elementary is not None:
         caption = "μ*: how much a factor acts, bars 95 %. σ: how much it bends, acts with others, or is noise."
@@ -104,7 +104,7 @@ def single_runs(found: Diagnostics, names: Sequence[str]) -> Spec:
 
 
 def box_cox_profile(found: BoxCox) -> Spec | None:
-    """ln SS over the power of the response, with its 95 % interval; None where there is no profile."""
+    """ln SS over the power of the response, with its 95 % interval; None if there is no profile."""
     if found.note:
         return None
     powers, sums = found.powers.tolist(), found.log_sum_of_squares.tolist()
@@ -120,7 +120,7 @@ def box_cox_profile(found: BoxCox) -> Spec | None:
 
 
 def ridge(result: DesignResult, model: FittedModel) -> Spec:
-    """Left: highest and lowest response within a distance of the centre, band 95 %; right: where the highest is."""
+    """Left: highest and lowest response within a distance of the centre, band 95 %; right: location of the highest."""
     df = model.surface.df_residual
     left, right = side_by_side(2, 0.12)
     traces: list[Json] = []

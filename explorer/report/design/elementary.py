@@ -31,18 +31,18 @@ def elementary(result: DesignResult) -> Section | None:
 
 
 def told(found: ElementaryEffects) -> list[str]:
-    """Factors whose mean effect is told from zero, all of them at once."""
+    """Factors whose mean effect differs significantly from zero, judged all at once."""
     return [one.factor for one in found.effects if one.p_holm < 0.05]
 
 
 def elementary_words(found: ElementaryEffects) -> str:
-    """The largest factors, and which are told from zero."""
+    """The largest factors, and which differ significantly from zero."""
     largest = ", ".join(f"{one.factor} {number(one.mu_star)}" for one in found.ranked[:MOST_NAMED])
     return f"by μ* {largest}; mean effect told from zero: {enumeration(told(found))} (p < 0.05 after Holm's correction)"
 
 
 def elementary_facts(found: ElementaryEffects) -> list[tuple[str, str]]:
-    """What acts, and what bends or acts with others."""
+    """Which factors act, and which act non-linearly or together with others."""
     bent = [one.factor for one in found.effects if one.sigma > one.mu_star > 0]
     return [
         ("Elementary effects", elementary_words(found)),

@@ -1,4 +1,4 @@
-"""Groups drawn at random: variance components, tests against the right error, and the groups themselves."""
+"""Randomly drawn groups: variance components, tests against the right error, and the groups themselves."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def groups(result: DesignResult) -> Section | None:
 
 
 def group_facts(result: DesignResult, found: RandomFit) -> list[tuple[str, str]]:
-    """What acts, and what share of the scatter lies between the groups."""
+    """What acts, and which share of the scatter lies between the groups."""
     acting = enumeration([term_text(one.source) for one in found.tests if one.p < ACTS])
     between, within = found.components
     response = result.response.path
@@ -81,7 +81,7 @@ def tests_table(found: RandomFit) -> Table:
 
 
 def estimates_table(found: RandomFit) -> Table:
-    """Coefficients of numbers, and of factors of two names (−1 and +1)."""
+    """Coefficients of numerical factors, and of factors with two names (−1 and +1)."""
     rows = tuple(
         (
             term_text(one.term),

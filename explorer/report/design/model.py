@@ -1,4 +1,4 @@
-"""The effects of a two-level design, and the fitted polynomial of any: tests, equations, ANOVA, single runs."""
+"""The effects of a two-level design, and the fitted polynomial of any design: tests, equations, ANOVA, single runs."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ from explorer.units import (
 )
 
 MOST_ALIASES = 4
-"""Effects that share a column and are listed by name."""
+"""Effects sharing a column that are listed by name at most."""
 MOST_DRAWN = 40
-"""Contrasts in a chart; the table has all."""
+"""Contrasts in a chart at most; the table has all."""
 
 
 def mixture(result: DesignResult) -> Section | None:
-    """Scheffé's polynomial of parts that add up to a whole; None for other designs."""
+    """Scheffé's polynomial for components that add up to a whole; None for other designs."""
     found = result.analysis.mixture
     if found is None:
         return None
@@ -63,7 +63,7 @@ def mixture_table(result: DesignResult, found: MixtureFit) -> Table:
 
 
 def blend_words(result: DesignResult, blend: Blend) -> str:
-    """A blend and the response there."""
+    """A blend and its response."""
     parts = [
         f"{one.name} = {parameter_value(one.path, amount)}"
         for one, amount in zip(result.factors, blend.amounts.tolist(), strict=True)
@@ -110,13 +110,13 @@ def effects(result: DesignResult) -> Section | None:
 
 
 def largest(effects: Sequence[FactorEffect]) -> tuple[FactorEffect, ...]:
-    """The effects that a chart has room for, in their order."""
+    """The effects for which a chart has room, in their order."""
     kept = {effect.name for effect in sorted(effects, key=_rank)[:MOST_DRAWN]}
     return tuple(effect for effect in effects if effect.name in kept)
 
 
 def effect_table(part: DrawnEffects) -> Table:
-    """All contrasts by falling size."""
+    """All contrasts by decreasing size."""
     rows = []
     for effect in sorted(part.analysis.effects, key=_rank):
         name, deciding = effect.name, part.analysis.deciding_test(effect)
@@ -142,7 +142,7 @@ def effect_table(part: DrawnEffects) -> Table:
 
 
 def also_holds(aliases: Sequence[str]) -> str:
-    """What else stands on the column of an effect; many parts of one size are counted."""
+    """What else shares the column of an effect; many aliases of one size are counted."""
     parts = {one.lstrip("-").partition(" ")[0] for one in aliases if " " in one}
     if len(aliases) > MOST_ALIASES and len(parts) == 1:
         return f"±{parts.pop()} of {len(aliases)} interactions"
@@ -150,7 +150,7 @@ def also_holds(aliases: Sequence[str]) -> str:
 
 
 def few_terms_table(models: Sequence[FewTermsModel]) -> Table:
-    """Models of few terms, the best first."""
+    """Models with few terms, the best first."""
     rows = tuple(
         (
             " ".join(
@@ -219,7 +219,7 @@ def _errors(part: DrawnEffects) -> list[tuple[str, str]]:
 
 
 def model(result: DesignResult) -> Section | None:
-    """Equations, analysis of variance and charts; None where the runs bear no model."""
+    """Equations, analysis of variance and charts; None if the runs support no model."""
     found, fitted = result.analysis.model, result.fitted
     if found is None or fitted is None:
         return None
@@ -293,7 +293,7 @@ def coefficient_table(found: FittedModel) -> Table:
 
 
 def diagnostics(result: DesignResult) -> Section | None:
-    """Is any run at odds with the model, and would another scale of the response do better?"""
+    """Whether any run disagrees with the model, and whether another scale of the response would be better."""
     model, fitted = result.analysis.model, result.fitted
     if model is None or fitted is None:
         return None
@@ -387,7 +387,7 @@ def _charts(fitted: FittedTarget) -> list[Block]:
 def _leverage(found: Diagnostics, labels: Sequence[str]) -> str:
     limit = found.leverage_limit
     if limit >= 1.0:
-        # A leverage is at most one; with so many terms for the runs the rule has nothing to say.
+        # A leverage is at most one; with so many terms per run, the rule says nothing.
         return f"at most {number(found.leverage.max())}; too few runs per term for the rule 2p/n"
     return _which(found.leveraged, labels, f"above 2p/n = {number(limit)}")
 

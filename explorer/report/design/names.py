@@ -1,4 +1,4 @@
-"""Factors that are names beside numbers: tests with all degrees of freedom, means of the names, settings per name."""
+"""Factors with names beside numerical ones: tests with all degrees of freedom, means and settings per name."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from explorer.units import (
 
 
 def names(result: DesignResult) -> Section | None:
-    """The model of a design with factors that are names; None for another one."""
+    """The model of a design with factors that are names; None for other designs."""
     found = result.analysis.named
     if found is None:
         return None
@@ -54,7 +54,7 @@ def names(result: DesignResult) -> Section | None:
 
 
 def fit_facts(result: DesignResult, found: NamedFit) -> list[tuple[str, str]]:
-    """How well the model fits, and which runs are at odds with it."""
+    """How well the model fits, and which runs disagree with it."""
     r2 = (found.r_squared, found.r_squared_adjusted, found.r_squared_predicted)
     press = "" if math.isinf(found.press) else f" (PRESS {number(found.press, 4)})"
     runs = enumeration([f"run {result.labels[k]}" for k in found.outliers])

@@ -1,4 +1,4 @@
-"""The report of a planned experiment: the runs of its sheet, what is confused with what, and what it will see."""
+"""The report of a planned experiment: the runs of its sheet, what is confounded with what, and what it can detect."""
 
 from __future__ import annotations
 
@@ -42,17 +42,17 @@ from explorer.report.methods import plan_methods
 from explorer.units import counted, enumeration, number
 
 MOST_ROWS = 60
-"""Runs that the page lists; the data have all."""
+"""Runs that the page lists at most; the data files have all."""
 ROW = 30
-"""Height of a factor [px]."""
+"""Height of a factor's row [px]."""
 WANTED = 0.8
-"""Chance to see a change, by which the smallest one is told."""
+"""Chance of detection by which the smallest detectable change is defined."""
 FURTHEST = 2.0
-"""Of the largest of these changes, up to which chances are drawn."""
+"""Multiple of the largest of these changes up to which chances are drawn."""
 
 
 def plan_report(result: PlanResult) -> Report:
-    """The report of a plan: what to run, in which order, and what it will be able to tell."""
+    """The report of a plan: what to run, in which order, and what the runs will be able to show."""
     methods, references = plan_methods(result)
     sections = (_in_short(result), _runs(result), _power(result), _aliases(result), methods)
     return Report(
@@ -72,11 +72,11 @@ def _count(result: PlanResult) -> str:
 
 
 CHANGES = {"factor": "by a factor (low to high)", "name": "between two names of a factor"}
-"""Kinds of terms that the banner tells of."""
+"""Kinds of terms that the banner mentions."""
 
 
 def banner(result: PlanResult) -> Banner:
-    """How many runs, and the smallest change of a factor that they will see."""
+    """The number of runs, and the smallest change by a factor that they will detect."""
     seen = [one for one in result.power if one.kind in CHANGES and math.isfinite(one.smallest)]
     if seen:
         in_sigma = "" if math.isfinite(result.sigma) else " σ"
@@ -137,7 +137,7 @@ def _runs(result: PlanResult) -> Section:
 
 
 def levels(result: PlanResult) -> Spec:
-    """Coded level of every factor over the runs in their order."""
+    """Coded level of every factor over the runs, in their order."""
     of_run = result.coded[[row - 1 for row, _ in result.sequence]]
     k = len(result.factors)
     most = max(1.0, float(np.abs(of_run).max()))
@@ -204,7 +204,7 @@ def _power(result: PlanResult) -> Section:
 
 
 def power(found: list[TermPrecision], unit: str) -> Spec:
-    """Chance to see a change of each kind of term, over its size."""
+    """Chance of detecting a change of each kind of term, over its size."""
     changes = np.linspace(0.0, FURTHEST * max(one.smallest for one in found), 81)[1:]
     traces = [
         {
@@ -233,7 +233,7 @@ def _aliases(result: PlanResult) -> Section:
 
 
 def _sheet(result: PlanResult) -> DataTable:
-    """The runs in their order, levels in the units of the factors, as the sheet has them."""
+    """The runs in order, with levels in the units of the factors, as on the sheet."""
     natural = region_of(result.factors).natural(result.coded)
     own = (*COLUMNS, BLOCK) if result.block else COLUMNS
     rows: list[tuple[str | int, ...]] = []

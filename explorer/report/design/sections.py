@@ -43,12 +43,12 @@ from explorer.units import (
 )
 
 WHOLE = ("block", "model", "residual", "lack_of_fit", "pure_error", "total")
-"""Rows of an analysis of variance that are no terms."""
+"""Rows of an analysis of variance that are not terms."""
 REPEAT_RUNS = "Repeat runs: replicates or centre runs show how large the noise is."
 
 
 def target(result: DesignResult) -> Section | None:
-    """The settings that give the target; None where none was asked for, or found."""
+    """The settings that give the target; None if no target was given, or none were found."""
     fitted, optimum, response = result.fitted, result.optimum, result.response.path
     if fitted is None or optimum is None:
         return None
@@ -93,7 +93,7 @@ def target(result: DesignResult) -> Section | None:
 
 
 def settings_table(result: DesignResult, optimum: OptimumResult) -> Table:
-    """Every factor at the target: its value where it is identified, the range that gives the target, its reference."""
+    """Every factor at the target: its value if it is identified, the range that gives the target, its reference."""
     rows = tuple(
         (*setting.cells, parameter_value(factor.path, factor.reference))
         for setting, factor in zip(settings(optimum), result.factors, strict=True)
@@ -124,7 +124,7 @@ def shape(result: DesignResult) -> Section | None:
 
 
 def axes_table(result: DesignResult, canonical: Canonical) -> Table:
-    """Eigenvalues with the directions along which the surface curves so."""
+    """Eigenvalues with the directions of these curvatures of the surface."""
     rows = tuple(
         (number(value, 4), *(number(direction[k], 3) for direction in canonical.eigenvectors))
         for k, value in enumerate(canonical.eigenvalues)
@@ -167,13 +167,13 @@ def _stationary(result: DesignResult, canonical: Canonical) -> list[tuple[str, s
 
 
 def sections_of(result: DesignResult) -> tuple[Section, ...]:
-    """Every section that ``result`` has something for."""
+    """Every section for which ``result`` has content."""
     found = (make(result) for make in SECTIONS)
     return tuple(section for section in found if section is not None)
 
 
 def banner(result: DesignResult) -> Banner:
-    """The target's settings if one was asked for, else what acts."""
+    """The settings for the target if one was given, else what acts."""
     found, response = result.analysis, result.response.path
     optimum = result.optimum
     if optimum is not None:
@@ -233,7 +233,7 @@ def banner(result: DesignResult) -> Banner:
 
 
 def _then(result: DesignResult) -> str:
-    """What to do once something acts; blends and groups drawn at random take no target."""
+    """What to do once something acts; blends and randomly drawn groups take no target."""
     if result.analysis.mixture is not None:
         return "Run the highest and the lowest blend again, and compare."
     if result.analysis.random is not None:
@@ -282,7 +282,7 @@ def _acting_names(result: DesignResult) -> list[str]:
 
 
 def _tested(result: DesignResult) -> bool:
-    """Whether anything was tested: without scatter, or without a model, no effect found is no finding."""
+    """Whether anything was tested: without scatter or a model, finding no effect means nothing."""
     found = result.analysis
     if found.effects is not None:
         return True  # at least by Lenth's margin
@@ -357,7 +357,7 @@ def in_short(result: DesignResult) -> Section:
 
 
 def acting(analysis: Screening) -> str:
-    """Which effects are significant, and by which judgement."""
+    """Which effects are significant, and by which test."""
     words = "the columns without a factor" if analysis.pure_error is None else "the replicates"
     tests = {e.name: test for e in analysis.effects if not e.is_dummy and (test := analysis.deciding_test(e))}
     tested = {name: test for name, test in tests.items() if math.isfinite(test.p)}
@@ -420,7 +420,7 @@ def all_runs(result: DesignResult) -> Section | None:
 
 
 def repeat(result: DesignResult) -> Section:
-    """The command that gives the same answer."""
+    """The command that reproduces the answer."""
     found = result.analysis
     text = "The same sheet gives the same numbers"
     if found.optimum is not None:

@@ -1,4 +1,4 @@
-"""The Gaussian process beside the polynomial: which predicts runs that it has not seen better, and its settings."""
+"""The Gaussian process beside the polynomial: which of them predicts unseen runs better, and its settings."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from explorer.units import (
 
 
 def surrogate(result: DesignResult) -> Section | None:
-    """The Gaussian process; None where none was asked for."""
+    """The Gaussian process; None if none was requested."""
     found, answer = result.analysis.surrogate, result.analysis.surrogate_target
     if found is None:
         return None
@@ -50,7 +50,7 @@ def surrogate(result: DesignResult) -> Section | None:
 
 
 def better_words(result: DesignResult) -> str:
-    """Which of both has the smaller errors of rows left out."""
+    """Which of the two has the smaller errors for rows left out."""
     found, model = result.analysis.surrogate, result.analysis.model
     assert found is not None
     process = found.r_squared_predicted_by_row
@@ -82,7 +82,7 @@ def errors_table(result: DesignResult, found: GaussianProcess) -> Table:
 
 
 def lengths_table(result: DesignResult, found: GaussianProcess) -> Table:
-    """Over which distance each factor changes the response."""
+    """The distance over which each factor changes the response."""
     ends = (LENGTHS[1] * 0.99, LENGTHS[0] * 1.01)
     rows = []
     for factor, length, half in zip(
@@ -118,7 +118,7 @@ def target_facts(result: DesignResult, answer: ProcessTarget) -> list[tuple[str,
 
 
 def process_settings(result: DesignResult, answer: ProcessTarget) -> Table:
-    """Every factor at the setting, and its range over what is compatible with the target."""
+    """Every factor at the setting, and its range over the settings compatible with the target."""
     rows = tuple(
         (
             factor.name,
@@ -139,7 +139,7 @@ def process_settings(result: DesignResult, answer: ProcessTarget) -> Table:
 
 
 def left_out_chart(result: DesignResult, found: GaussianProcess) -> Spec:
-    """Every run against its prediction without it."""
+    """Every run against its prediction by a fit without it."""
     predicted = found.observed - found.left_out
     ends = [float(min(found.observed.min(), predicted.min())), float(max(found.observed.max(), predicted.max()))]
     marks = points(

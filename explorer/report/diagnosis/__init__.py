@@ -41,7 +41,7 @@ SECTIONS: tuple[Callable[[DiagnosisResult], Section | None], ...] = (
     how_reached,
     repeat,
 )
-"""In the order of the page: the answer and what it rests on first, then how it was found."""
+"""In the order of the page: first the answer and its evidence, then how it was found."""
 
 
 def diagnosis_report(result: DiagnosisResult) -> Report:
@@ -69,6 +69,6 @@ def diagnosis_markdown(result: DiagnosisResult) -> str:
 
 
 def sections_of(result: DiagnosisResult) -> tuple[Section, ...]:
-    """Every section that ``result`` has something for."""
+    """Every section for which ``result`` has content."""
     found = (make(result) for make in SECTIONS)
     return tuple(section for section in found if section is not None)

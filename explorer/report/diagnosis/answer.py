@@ -1,4 +1,4 @@
-"""The answer: what is missing and how sure, what else could look the same, what would tell, what stayed unseen."""
+"""The answer: what is missing, how certain it is, what else could look the same, what would decide, what is unseen."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ from explorer.units import MISSING, code, counted, enumeration, fixed, p_value, 
 from solver.effects import EFFECTS, Stage
 
 FAR = 2.0
-"""Error over noise floor beyond which a model is called off: a true one keeps below 1.4 in 95 of 100 cases with eight
-independent numbers (√(χ²₈/8)), and below 1.8 with two."""
+"""Error over noise floor above which a model is reported as off: a true model stays below 1.4 in 95 of 100 cases with
+eight independent numbers (√(χ²₈/8)), and below 1.8 with two."""
 WIDE = 1.5
-"""Variance of the measured replicates over that of simulated pours from which on it is worth a sentence."""
+"""Ratio of the variances of measured replicates and simulated pours from which it is mentioned."""
 VISIBLE = 4.0
 """Shift [standard errors of the data] at which an effect stands out."""
 ALIKE = 0.7
-"""|cosine| of two shifts from which on they are called alike: half of one's square is in the other."""
+"""|cosine| of two shifts from which they are called alike: half of the square of one is in the other."""
 LOOSE = 0.3
-"""Probability of data as far off a named effect as these, below which it is said that another one may hide beside it.
-Of right names three in ten lie below by chance. Of 20 names of one effect by scans (root 1) six did: three of 17 right
-ones, both that were one of two effects, and the one for an outside effect (``docs/how_often_right.md``)."""
+"""Probability of data as far from a named effect as these, below which a note says that another may hide beside it.
+Three in ten correct names lie below it by chance. Of 20 names of one effect by scans (root 1) six did: three of 17
+correct ones, both that were one of two effects, and the one for an outside effect (``docs/how_often_right.md``)."""
 FAIR = 0.5
-"""Chance of an answer below which a set-up is not likely to give one."""
+"""Chance of an answer below which a set-up is called unlikely to give one."""
 MOST_LEVERS = 6
 ADHESIONS = {name for name, effect in EFFECTS.items() if getattr(effect, "stage", None) == Stage.ADHESION}
 """Effects that pull surfaces together."""
@@ -98,17 +98,17 @@ def _what_next(result: DiagnosisResult) -> str:
 
 
 def _check(result: DiagnosisResult) -> str:
-    """What of single bodies would check an answer that is given; empty where nothing would."""
+    """Which measurements on single bodies would check the answer; empty if none would."""
     return f" {_with_command(result)}" if result.next_experiment else ""
 
 
 def _with_command(result: DiagnosisResult) -> str:
-    """What to measure, and the command that takes it."""
+    """What to measure, and the command that uses it."""
     return f"{follow_up_text(result)} `explorer diagnose … --follow-up` takes them."
 
 
 def _asking_further(result: DiagnosisResult) -> str:
-    """The command that asks what else is missing."""
+    """The command that looks for what else is missing."""
     return f"`explorer diagnose … --given {result.order.out}`"
 
 
@@ -133,7 +133,7 @@ def in_short(result: DiagnosisResult) -> Section:
 
 
 def verdict_sentence(result: DiagnosisResult) -> str:
-    """The verdict for an engineer, with what held-out data say of it, and what the model had before."""
+    """The verdict for an engineer, with what held-out data say about it, and what the model already had."""
     if not result.given:
         return _verdict(result)
     known = enumeration([code(name) for name in result.given])
@@ -183,13 +183,13 @@ def _verdict(result: DiagnosisResult) -> str:
 
 
 def _alone(result: DiagnosisResult, name: str) -> str:
-    """Whether the data tell that a named effect is alone."""
+    """Whether the data show that a named effect is alone."""
     p = result.probability(name)
     return "" if p >= result.threshold else f", alone ({chance(p)}) or with another effect"
 
 
 def _in_common(result: DiagnosisResult) -> str:
-    """What is settled though several answers are left: an effect that all of them have, or that all are adhesions."""
+    """What is settled although several answers remain: an effect common to all, or that all are adhesions."""
     left = [set(members(one)) for one in answers(result.verdict)]
     if shared := sorted(set.intersection(*left)):
         p = sum(row.probability for row in result.effects if set(shared) <= set(members(row.name)))
@@ -201,7 +201,7 @@ def _in_common(result: DiagnosisResult) -> str:
 
 
 def confirmation_sentence(result: DiagnosisResult) -> str:
-    """What conditions that were not fitted say, by fresh simulations."""
+    """What conditions that were not fitted say, from fresh simulations."""
     row = result.overall("holdout")
     if row is None:
         return "No condition was held out, so nothing independent confirms it."
@@ -219,7 +219,7 @@ def confirmation_sentence(result: DiagnosisResult) -> str:
 
 
 def cautions(result: DiagnosisResult) -> list[str]:
-    """What keeps the numbers of this diagnosis from meaning more than they do, one sentence each."""
+    """Limits on the meaning of the numbers of this diagnosis, one sentence each."""
     found = []
     state = result.confirmed()
     if state == "no holdout":
@@ -345,13 +345,13 @@ def _amplitudes(result: DiagnosisResult, label: str) -> str:
 
 
 def _of_bounds(row: EffectRow) -> list[str]:
-    """Amplitudes over the strongest that the literature supports, effect by effect."""
+    """Amplitudes relative to the strongest that the literature supports, effect by effect."""
     values = {name: [one.value for one in row.amplitudes if one.effect == name] for name in members(row.name)}
     return [percent(share_of_bound(name, own)) for name, own in values.items()]
 
 
 def follow_up_text(result: DiagnosisResult) -> str:
-    """What would tell the answers apart that are left, or check the one that is given, and with which chance."""
+    """What would tell the remaining answers apart, or check the one given, and with which chance."""
     if not result.order.plan_next:
         return "What could tell them apart was not looked for (`--no-next`)."
     if not result.next_experiment:
@@ -451,7 +451,7 @@ def _sure(p: float) -> str:
 
 
 def rivals(result: DiagnosisResult) -> Section:
-    """Effects that shift the data alike, and the experiments that would tell the answers apart."""
+    """Effects that shift the data in a similar way, and the experiments that would tell the answers apart."""
     blocks: list[Block] = [Text(_alike_words(result))]
     pairs = _alike(result)
     if pairs:
@@ -497,7 +497,7 @@ def _alike_words(result: DiagnosisResult) -> str:
 
 
 def _alike(result: DiagnosisResult) -> list[tuple[str, str, float]]:
-    """Pairs (effect in the answer, other, cosine); among all effects where the answer names none."""
+    """Pairs (effect in the answer, other, cosine); among all effects if the answer names none."""
     names = set(_asked(result))
     found = []
     for first, second, cosine in result.similar:
@@ -508,13 +508,13 @@ def _alike(result: DiagnosisResult) -> list[tuple[str, str, float]]:
 
 
 def _asked(result: DiagnosisResult) -> list[str]:
-    """Single effects in the answer, also in one that was taken back."""
+    """Single effects in the answer, also if it was taken back."""
     labels = [one for one in answers(result.taken_back or result.verdict) if one not in (NO_EFFECT, UNEXPLAINED)]
     return list(dict.fromkeys(name for label in labels for name in members(label)))
 
 
 def _in_question(result: DiagnosisResult) -> list[str]:
-    """Effects in the answer and those that look like them; none where it holds no effect."""
+    """Effects in the answer and those that look like them; empty if it has no effect."""
     names = _asked(result)
     return list(dict.fromkeys([*names, *(other for _, other, _ in _alike(result) if names)]))[:MOST_LEVERS]
 
@@ -550,7 +550,7 @@ def _ranked(result: DiagnosisResult) -> list[Block]:
 
 
 def could_have_seen(result: DiagnosisResult) -> Section | None:
-    """About which amplitude of every effect would have stood out; None where something was found."""
+    """Approximate amplitude at which each effect would have stood out; None if something was found."""
     if result.kind != "no_missing_effect":
         return None
     rows = []
@@ -570,12 +570,12 @@ def could_have_seen(result: DiagnosisResult) -> Section | None:
 
 
 def strength_at_end(result: DiagnosisResult, row: EffectRow) -> float:
-    """Shift [σ] by the largest amplitude of an effect's range, in proportion to that of its reference amplitude."""
+    """Shift [σ] at the largest amplitude of an effect's range, scaled from that at its reference amplitude."""
     return row.strength * _end(result, row) / math.hypot(*row.reference)
 
 
 def visible_from(result: DiagnosisResult, row: EffectRow) -> str:
-    """The amplitude that shifts by ``VISIBLE``, in words; says so where the range ends before."""
+    """The amplitude that shifts by ``VISIBLE``, in words; says so if the range ends before it."""
     if strength_at_end(result, row) < VISIBLE:
         return "not for certain, even at its bound"
     return size_text(row.name, math.hypot(*row.reference) * VISIBLE / row.strength)

@@ -1,6 +1,6 @@
-"""Charts of a diagnosis, those that its result has something for: probabilities, errors, residuals, piles, maps.
+"""Charts of a diagnosis, as far as its result has content: probabilities, errors, residuals, piles, maps.
 
-Errors are shown over the noise floor, residuals with the bands that a right model keeps to.
+Errors are shown relative to the noise floor, residuals with the bands within which a correct model stays.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ ROW_HEIGHT = 30
 BAND = {TARGET: "rgba(39, 164, 119, 0.18)", FACTOR: "rgba(101, 110, 224, 0.18)", ASSUMPTION: "rgba(212, 120, 40, 0.18)"}
 MM = 1e3
 FEWEST, LEAST = 3, 0.005
-"""Answers that are drawn or listed: so many at least, and all of this probability."""
+"""Answers that are drawn or listed: at least this many, and all with at least this probability."""
 MOST_RESIDUALS = 40
-"""Features that are drawn; the table holds all."""
+"""Features that are drawn at most; the table holds all."""
 ROLES: dict[Role, str] = {"holdout": "held-out", "fit": "fitted"}
 
 
@@ -68,15 +68,15 @@ def diagnosis_plots(result: DiagnosisResult) -> Plots:
 
 
 def likely(result: DiagnosisResult) -> list[tuple[str, float]]:
-    """The answers that are worth a row, the most probable first."""
+    """The answers that get a row, the most probable first."""
     found = result.ranked()
     return [one for k, one in enumerate(found) if k < FEWEST or one[1] >= LEAST]
 
 
 def probability_chart(result: DiagnosisResult) -> Spec:
-    """Probability of every answer that is worth a row, and of its effect beside another, with the threshold for a name.
+    """Probability of every answer that gets a row, and of its effect beside another, with the threshold for a name.
 
-    An effect beside another one is in the row of the pair as well.
+    An effect beside another one is also in the row of the pair.
     """
     rows = likely(result)[::-1]
     colours = {NO_EFFECT: TARGET, UNEXPLAINED: DUMMY}
@@ -108,7 +108,7 @@ def probability_chart(result: DiagnosisResult) -> Spec:
 
 
 def error_chart(result: DiagnosisResult, role: Role) -> Spec:
-    """Errors before and after divided by the noise floor, one row per observable."""
+    """Errors before and after, divided by the noise floor, one row per observable."""
     rows = [row for row in result.error.of(role) if row.noise_floor > 0.0][::-1]
     names = [label(feature_label(row.observable)) for row in rows]
     traces = [
@@ -127,7 +127,7 @@ def error_chart(result: DiagnosisResult, role: Role) -> Spec:
 
 
 def drawn_residuals(result: DiagnosisResult) -> tuple[Residual, ...]:
-    """Rows of the features farthest off, before or after, in their own order."""
+    """Rows of the features with the largest residuals, before or after, in their original order."""
     rows = result.residuals
     sizes = [max(abs(row.z_before), abs(row.z_after)) for row in rows]
     chosen = sorted(range(len(rows)), key=lambda k: -sizes[k])[:MOST_RESIDUALS]
@@ -135,7 +135,7 @@ def drawn_residuals(result: DiagnosisResult) -> tuple[Residual, ...]:
 
 
 def residual_chart(result: DiagnosisResult) -> Spec:
-    """Residuals before and after [σ] with the bands that a right model keeps to."""
+    """Residuals before and after [σ], with the bands within which a correct model stays."""
     rows = drawn_residuals(result)[::-1]
     names = [label(f"{row.condition} · {feature_label(row.feature)}") for row in rows]
     traces: list[Json] = [
@@ -170,7 +170,7 @@ def residual_chart(result: DiagnosisResult) -> Spec:
 
 
 def bands(features: int) -> tuple[float, float]:
-    """Half widths [σ] that a right model keeps to with chance 0.95: one feature, and all of them (Bonferroni)."""
+    """Half-widths [σ] within which a correct model stays with chance 0.95: one feature, and all (Bonferroni)."""
     return float(stats.norm.isf(0.025)), float(stats.norm.isf(0.025 / features))
 
 
@@ -186,7 +186,7 @@ def pile_chart(picture: PileProfiles) -> Spec:
     ):
         mean, sd = ([MM * h for h in _mirrored(one)] for one in (found.mean, found.sd))
         traces += profile(words, x, mean, sd, (colour, BAND[colour], dash))
-    # Not at equal scales: a pile a third as high as wide would leave nothing to be told apart.
+    # Not at equal scales: in a pile a third as high as wide, the profiles could not be told apart.
     layout: Json = {
         "xaxis": axis("distance from the pile's middle [mm]"),
         "yaxis": axis("mean height [mm]", rangemode="tozero"),

@@ -1,4 +1,4 @@
-"""What the answer rests on: errors and piles by fresh pours, residuals, what every effect could do, and parameters."""
+"""Evidence for the answer: errors and piles by fresh pours, residuals, what every effect could do, and parameters."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ from explorer.units import (
 from solver.effects import EFFECTS
 
 FAR_OFF = 2.0
-"""Standard deviations of its measurement by which a calibrated parameter is said to be off."""
+"""Deviation, in standard deviations of its measurement, from which a calibrated parameter is reported as off."""
 ERROR_HEADER = (
     "observable",
     "before",
@@ -76,7 +76,7 @@ def pours_of(result: DiagnosisResult, condition: str) -> str:
 
 
 def error(result: DiagnosisResult) -> Section:
-    """Tables for held-out and fitted conditions; the held-out ones come first and open."""
+    """Tables for held-out and fitted conditions; the held-out ones come first and unfolded."""
     blocks: list[Block] = []
     if result.added:
         blocks.append(Text(f"After: {final_model(result)}."))
@@ -125,7 +125,7 @@ def _error_row(result: DiagnosisResult, row: ErrorRow) -> tuple[str, ...]:
 
 
 def pile(result: DiagnosisResult) -> Section | None:
-    """A picture per condition that has profiles, held-out ones first; None where none has."""
+    """A picture per condition with profiles, held-out ones first; None if none has."""
     pictures = sorted(result.piles, key=lambda row: row.role != "holdout")
     if not pictures:
         return None
@@ -149,7 +149,7 @@ def pile(result: DiagnosisResult) -> Section | None:
 
 
 def over_the_plate(result: DiagnosisResult) -> Section | None:
-    """Where in the scanned piles the residual sits; None without scans."""
+    """Where in the scanned piles the residual is; None without scans."""
     if not result.maps:
         return None
     text = (
@@ -175,7 +175,7 @@ def over_the_plate(result: DiagnosisResult) -> Section | None:
 
 
 def _map_row(picture: ResidualMap) -> tuple[str, ...]:
-    """Root mean squares where the pile is half a body high at least: the plate around it says nothing."""
+    """Root mean squares where the pile is at least half a body high: the plate around it says nothing."""
     before, after = picture.before.z, picture.after.z
     covered = picture.measured >= 0.5 * picture.pixel
     place = np.unravel_index(np.abs(before).argmax(), before.shape)
@@ -190,7 +190,7 @@ def _role(picture: PileProfiles | ResidualMap) -> str:
 
 
 def residuals(result: DiagnosisResult) -> Section:
-    """Where the residual sits, the bar chart with its bands, and the numbers behind it."""
+    """Where the residual is, the bar chart with its bands, and the numbers behind it."""
     features, drawn = len(result.residuals), len(drawn_residuals(result))
     one, every = bands(features)
     text = (
@@ -237,7 +237,7 @@ def _residual_table(result: DiagnosisResult) -> Table:
 
 
 def effects(result: DiagnosisResult) -> Section:
-    """What the data say of every effect, and beside it the range, literature and lever of each."""
+    """What the data say about every effect, and beside it the range, literature and lever of each."""
     text = (
         "Log evidence: natural logarithm of the evidence for the effect, over all its amplitudes, signs and "
         "directions, less that of the declared model. p: chance of data as far off as these if the best fit were true. "
@@ -294,7 +294,7 @@ def _bounds(result: DiagnosisResult) -> Table:
 
 
 def single_bodies(result: DiagnosisResult) -> Section | None:
-    """What was measured of single bodies, beside both models; None where nothing was."""
+    """What was measured on single bodies, beside both models; None if nothing was."""
     if not result.bodies:
         return None
     rows = tuple(
@@ -318,7 +318,7 @@ def single_bodies(result: DiagnosisResult) -> Section | None:
 
 
 def parameters(result: DiagnosisResult) -> Section:
-    """Calibrated parameters without and with what is added, beside their measurement; a sentence for each far off."""
+    """Calibrated parameters before and after, beside their measurement; a sentence for each that is far off."""
     rows = []
     for row in result.parameters:
         name = row.name
@@ -356,7 +356,7 @@ def strained(result: DiagnosisResult) -> list[str]:
             elif row.mean is not None and row.sd is not None and abs(value - row.mean) > FAR_OFF * row.sd:
                 where = f"{fixed(abs(value - row.mean) / row.sd, 1)} standard deviations from its measurement"
             if where:
-                # Nobody measured what is given: its range is about an earlier answer.
+                # A given effect was not measured: its range is about an earlier answer.
                 so = (
                     "Its range is about an earlier answer; there may be less of it, or more, than that."
                     if given

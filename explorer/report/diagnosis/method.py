@@ -24,7 +24,7 @@ OFFERS = {"scalars": "scalars", "profile": "scalars and height profiles", "scan"
 
 
 def data(result: DiagnosisResult) -> Section:
-    """Conditions, what each offers and what a scan would add, what is not used, and the scatter."""
+    """Conditions, what each offers, what a scan would add, what is not used, and the scatter."""
     offered = {row.condition: row for row in result.offered}
     rows = []
     for row in result.measured:
@@ -154,7 +154,7 @@ def _pours(result: DiagnosisResult, condition: str) -> str:
 def how_reached(result: DiagnosisResult) -> Section:
     """The method in six lines, with the numbers of its rules."""
     rule = {name: number(value) for name, value in vars(result.rule).items()}
-    # A result from before this condition was judged without it.
+    # A result from before this condition existed was judged without it.
     doubted = (
         f", and unlikely under the declared model (p < {rule['doubted']}, or the name would stand were its parameters "
         "measured right where it wants them)"
@@ -204,7 +204,7 @@ def how_reached(result: DiagnosisResult) -> Section:
 
 
 def repeat(result: DiagnosisResult) -> Section:
-    """The command that gives the same answer; pours that are in the store are not run again."""
+    """The command that reproduces the answer; pours in the store are not run again."""
     pours = result.pours
     text = (
         f"{pours.settings} settings of the declared model and its effects, each poured in every fitted condition; "

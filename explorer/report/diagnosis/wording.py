@@ -1,6 +1,6 @@
-"""Words of a diagnosis: answers, models, amplitudes, features and their units, as sections, charts and page say them.
+"""Words of a diagnosis: answers, models, amplitudes, features and their units, for sections, charts and page.
 
-A label is "base", an effect, or a pair "a+b"; an answer is a label but "base", or ``NO_EFFECT`` or ``UNEXPLAINED``.
+A label is "base", an effect, or a pair "a+b"; an answer is a label except "base", or ``NO_EFFECT`` or ``UNEXPLAINED``.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from solver.effects import EFFECTS
 from solver.observables.surface_features import EDGES, RINGS
 
 ROUNDING = 1e-9
-"""Share of the strongest amplitude below which one is zero."""
+"""Share of the strongest amplitude below which an amplitude counts as zero."""
 FOLLOW_UPS_SO_FAR = "On made-up data 53 of 59 follow-ups found it, where 84 % had been stated."
 """Root 4 of ``assets/validation/sets.jsonl`` (``docs/how_often_right.md``)."""
 
@@ -51,7 +51,7 @@ def spelled(answer: str) -> str:
 
 
 def chance(p: float) -> str:
-    """A probability in per cent, to a tenth; what rounds to none or all is called less or more."""
+    """A probability in per cent, to a tenth; one that rounds to none or all is given as less or more."""
     if p >= 0.9995:
         return ">99.9 %"
     return "<0.1 %" if p < 0.0005 else percent(p, 1)
@@ -86,9 +86,9 @@ def amplitude_label(effect: str, index: int) -> str:
 
 
 def amplitude_text(estimate: Amplitude) -> str:
-    """Value and 95 % interval with unit; says so where the largest amplitude is the best one."""
+    """Value and 95 % interval with unit; says so if the largest amplitude is the best one."""
     unit = unit_of_parameter(amplitude_path(estimate.effect, estimate.index))
-    # Directions round the plane leave a sine of 180° that is not quite zero.
+    # For directions in the plane, the computed sine of 180° is not quite zero.
     least = ROUNDING * EFFECTS[estimate.effect].strongest
     sizes = (one if abs(one) > least else 0.0 for one in (estimate.value, estimate.low, estimate.high))
     value, low, high = (number(unit.of(one)) for one in sizes)
@@ -102,14 +102,14 @@ def amplitudes_of(estimates: Sequence[Amplitude]) -> str:
 
 
 def given_text(effect: str, amplitude: Sequence[float]) -> str:
-    """An effect that the declared model holds, e.g. "`rolling_resistance`, rolling friction 0.12"."""
+    """An effect that the declared model has, e.g. "`rolling_resistance`, rolling friction 0.12"."""
     named = [(index, amplitude_path(effect, index), one) for index, one in enumerate(amplitude)]
     sizes = (f"{amplitude_label(effect, index)} {parameter_value(path, one)}" for index, path, one in named)
     return ", ".join((code(effect), *sizes))
 
 
 def share_of_bound(effect: str, amplitudes: Sequence[float]) -> float:
-    """Size of an effect's amplitudes over the strongest that the literature supports."""
+    """Size of an effect's amplitudes relative to the strongest that the literature supports."""
     return math.hypot(*amplitudes) / EFFECTS[effect].strongest
 
 
@@ -119,7 +119,7 @@ def literature_bound(effect: str) -> str:
 
 
 def size_text(effect: str, size: float) -> str:
-    """An amplitude of that size with its name, or "in any direction" of an effect in the plane."""
+    """An amplitude of that size with its name, or "in any direction" for an effect in the plane."""
     unit = unit_of_parameter(amplitude_path(effect, 0))
     value = unit.attach(number(unit.of(size)))
     planar = len(EFFECTS[effect].amplitudes) > 1
@@ -132,7 +132,7 @@ def reference_text(row: EffectRow) -> str:
 
 
 def simulated_range(result: DiagnosisResult, effect: str) -> str:
-    """The widest range in which each amplitude of an effect can be set up here."""
+    """The widest range in which each amplitude of an effect can be simulated here."""
     bounds = result.range_of(effect)
     return "; ".join(
         parameter_range(amplitude_path(effect, index), low, high)
@@ -160,7 +160,7 @@ def feature_label(name: str) -> str:
 
 
 def feature_unit(result: DiagnosisResult, name: str) -> ReadingUnit:
-    """Unit in which a feature is read; for all together the standard deviation of a pour in each."""
+    """Unit in which a feature is read; for all features together, the standard deviation of a pour in each."""
     if name == OVERALL:
         return ReadingUnit("SD", 1.0)
     plain = name.partition("@")[0]
@@ -210,5 +210,5 @@ SURFACE_UNITS = {
 
 
 def with_fit(told: HeldOut) -> str:
-    """What the fitted data add to p of the held-out data."""
+    """What the fitted data add to the p of the held-out data."""
     return "" if told.fit == 1.0 else f"; with that of the fitted data, {p_value(told.fit)}, {p_value(told.together)}"

@@ -1,7 +1,7 @@
 """Charts of a bench test: a laboratory's curves and replicates, and what the solver's instrument read.
 
-Of the laboratory every replicate, with the part that was taken as straight, or the mean with its interval; of the
-solver every column against the first.
+For a laboratory: every replicate, with the part that was taken as straight, or the mean with its interval. For the
+solver: every column against the first.
 """
 
 from __future__ import annotations
@@ -42,16 +42,16 @@ ROW = 34
 ACROSS = 3
 """Quantities side by side."""
 MOST_POINTS = 10_000
-"""Of the curves of one chart."""
+"""Points of all curves of one chart."""
 LEAST_POINTS = 3
-"""Fewer readings of the solver's instrument are a few numbers, which the table has, and no curve."""
+"""Fewer readings of the solver's instrument make no curve: the table holds these few numbers."""
 NEGLIGIBLE = 1e-9
-"""Spread relative to the mean that is rounding."""
+"""Spread relative to the mean that counts as rounding."""
 SAMPLES = (FACTOR, ASSUMPTION, TARGET, CHOSEN)
 
 
 def curve_charts(result: LabResult) -> dict[str, Spec]:
-    """Title → chart per component and quantity; none where the readings are no curves."""
+    """Title → chart per component and quantity; empty if the readings are not curves."""
     groups: dict[str, list[CurveFit]] = {}
     for curve in result.curves:
         groups.setdefault(curve_title(curve), []).append(curve)
@@ -59,12 +59,12 @@ def curve_charts(result: LabResult) -> dict[str, Spec]:
 
 
 def curve_title(curve: CurveFit) -> str:
-    """Whose curve it is, and for what."""
+    """Whose curve it is, and what it is for."""
     return f"{'-'.join(curve.of)}, {curve.quantity}"
 
 
 def force_displacement(curves: list[CurveFit], title: str) -> Spec:
-    """Points of every replicate and, over them, the part that counts, straight or Hertzian, drawn on to zero force."""
+    """Points of every replicate and, over them, the fitted part, straight or Hertzian, extended to zero force."""
     traces: list[Json] = []
     step = max(1, -(-sum(len(curve.force) for curve in curves) // MOST_POINTS))
     for curve in curves:
@@ -106,12 +106,12 @@ def force_displacement(curves: list[CurveFit], title: str) -> Spec:
 
 
 def is_straight(curve: CurveFit) -> bool:
-    """Whether its part that counts is a line, not Hertz’s law."""
+    """Whether the fitted part is a line, not Hertz’s law."""
     return isinstance(curve.fit, LinearRange)
 
 
 def side_by_side_quantities(result: LabResult) -> list[dict[str, list[Derived]]]:
-    """What replicates gave by quantity, as many of them as a chart has panels in each."""
+    """Results of replicates by quantity, in groups of as many quantities as a chart has panels."""
     found: dict[str, list[Derived]] = {}
     for one in result.derived:
         if one.name not in CONDITIONS:
@@ -121,7 +121,7 @@ def side_by_side_quantities(result: LabResult) -> list[dict[str, list[Derived]]]
 
 
 def _shows(one: Derived) -> bool:
-    """Whether there is something to see: replicates of one value, as of a speed that was set, are no scatter."""
+    """Whether there is scatter to see: replicates of one value, such as a set speed, show none."""
     return one.summary.n == 1 or one.summary.sd > NEGLIGIBLE * abs(one.summary.mean)
 
 
@@ -169,7 +169,7 @@ def _panel(own: Sequence[Derived], unit: ReadingUnit) -> Iterator[Json]:
 
 
 def sieve_charts(readings: Sequence[Reading]) -> dict[str, Spec]:
-    """Component → share of the mass that is finer than each sieve, a line per sample, with the Rosin–Rammler line."""
+    """Component → share of mass finer than each sieve, a line per sample, with the Rosin–Rammler line."""
     groups: dict[str, list[Reading]] = {}
     for row in readings:
         groups.setdefault(row.of[0], []).append(row)
@@ -202,12 +202,12 @@ def _undersize(samples: Mapping[str, list[Reading]]) -> Spec:
 
 
 def specimen(one: Derived | Estimate) -> str:
-    """Of which component or pair."""
+    """The component or pair that was tested."""
     return "–".join(one.of).replace("_", " ")
 
 
 def bench_unit(si: str) -> ReadingUnit:
-    """Unit in which a report writes what a bench test gave; slopes in degrees."""
+    """Unit in which a report writes results of a bench test; slopes in degrees."""
     return ReadingUnit("°", math.pi / 180.0) if si == "rad" else reading_unit(si)
 
 

@@ -1,7 +1,7 @@
 """Charts of a two-level design: Pareto of |t|, half-normal plot, main effects, and all effects side by side.
 
-Main effects are the mean of the response at the low and at the high level of each factor; all effects are those of
-factors and of assumptions about the set-up.
+Main effects are drawn as the mean of the response at the low and the high level of each factor; all effects are those
+of factors and of assumptions about the set-up.
 """
 
 from __future__ import annotations
@@ -38,17 +38,17 @@ from explorer.units import counted, fixed, number, observable_title, parameter_l
 ROW_HEIGHT = 19
 """Height of one bar or interval [px]."""
 LABELLED = 12
-"""Effects that carry their name in the half-normal plot; the smaller ones overlap and tell it by hover."""
+"""Effects labelled by name in the half-normal plot; smaller ones overlap and show their name on hover."""
 MOST = 8
-"""Factors that are drawn, those with the largest effects."""
+"""Factors drawn at most: those with the largest effects."""
 ACROSS = 4
-"""Of them side by side."""
+"""Charts side by side."""
 GAP, ROW_GAP = 0.03, 0.16
-"""Space between them [share of the width, of the height]."""
+"""Space between charts [share of the width, of the height]."""
 
 
 class EffectsOf(Protocol):
-    """Effects of a two-level design with what its columns stand for: a screening, or a design of any laboratory."""
+    """Effects of a two-level design and the meaning of its columns: a screening, or a design of any laboratory."""
 
     @property
     def analysis(self) -> Screening:
@@ -60,7 +60,7 @@ class EffectsOf(Protocol):
 
     @property
     def factors(self) -> tuple[Factor, ...]:
-        """What the columns that are no dummies stand for."""
+        """The factors of the columns that are not dummies."""
 
     @property
     def response(self) -> str:
@@ -74,7 +74,7 @@ def pareto(screening: EffectsOf) -> Spec | None:
 
 
 def errors_at_hand(analysis: Screening) -> list[ErrorSource]:
-    """The errors against which effects can be judged, the deciding one first."""
+    """The errors against which effects can be judged, the decisive one first."""
     sources: tuple[ErrorSource, ...] = ("replicates", "dummies")
     return [
         source
@@ -84,7 +84,7 @@ def errors_at_hand(analysis: Screening) -> list[ErrorSource]:
 
 
 def pareto_against(screening: EffectsOf, errors: list[ErrorSource]) -> Spec:
-    """The same against ``errors``, side by side; there has to be one."""
+    """The Pareto chart against ``errors``, side by side; there must be at least one."""
     analysis = screening.analysis
     effects = sorted(analysis.effects, key=lambda effect: t if math.isfinite(t := _t(effect, errors[0])) else -1.0)
     titles = _titles(screening)
@@ -161,10 +161,10 @@ def half_normal(screening: EffectsOf) -> Spec:
 
 
 def main_effects(screening: EffectsOf) -> Spec | None:
-    """Small charts with one axis, the largest effects first; None where no effect could be estimated.
+    """Small charts with one axis, the largest effects first; None if no effect could be estimated.
 
-    The interval of a level's mean follows from that of the effect e = ȳ(high) − ȳ(low) of a balanced design: its half
-    width is that of e divided by √2.
+    The interval of a level's mean follows from that of the effect e = ȳ(high) − ȳ(low) of a balanced design: its
+    half-width is that of e divided by √2.
     """
     analysis, unit = screening.analysis, unit_of_observable(screening.response)
     effects = analysis.factor_effects()[:MOST]
@@ -247,17 +247,17 @@ def all_effects(screening: ScreeningResult, assumptions: ScreeningResult | None)
 
 
 def _titles(part: EffectsOf) -> dict[str, str]:
-    """Column → what stands on the axis: name and parameter of a factor, name of a dummy."""
+    """Column → its text on the axis: name and parameter of a factor, name of a dummy."""
     parameters = {factor.name: parameter_label(factor.path) for factor in part.factors}
     return {
         column: f"{column} · {parameters[column]}" if column in parameters and "_" not in column
-        # A name that spells its parameter out needs no second wording.
+        # A name that spells out its parameter needs no second text.
         else column.replace("_", " ")
         for column in part.columns
     }  # fmt: skip
 
 
 def _t(effect: FactorEffect, source: ErrorSource) -> float:
-    """|t| of an effect against an error; NaN where it was not tested."""
+    """|t| of an effect against an error; NaN if it was not tested."""
     test = effect.test_by(source)
     return math.nan if test is None else abs(test.t)

@@ -1,7 +1,7 @@
 """The response surface of one target with what charts mark on it, its profiler, and how well its optimum is known.
 
-A study's surface and that of a design from any laboratory are drawn by the same charts; both come as `FittedTarget`.
-The profiler is the model along each factor through one point, with its interval, and the target.
+The same charts draw a study's surface and that of a design from any laboratory; both come as `FittedTarget`. The
+profiler shows the model along each factor through one point, with its interval, and the target.
 """
 
 from __future__ import annotations
@@ -55,14 +55,14 @@ Array = npt.NDArray[np.float64]
 TRACE_POINTS = 31
 """Points along each factor of the profiler."""
 MOST_PANELS = 3
-"""Factors up to which every pair of them has a panel."""
+"""Number of factors up to which every pair has a panel."""
 ROW_GAP = 0.13
 """Space between two rows of the profiler, for the title of the axis [share of the height]."""
 
 
 @dataclass(frozen=True)
 class FittedTarget:
-    """Natural values in SI, the response in the unit of the store; k factors."""
+    """A target's response surface over k factors: natural values in SI, the response in the unit of the store."""
 
     model: Surface
     anova: SurfaceAnova
@@ -74,7 +74,7 @@ class FittedTarget:
     margin: float
     optimum: OptimumResult | None
     reference_name: str = "measured parameters"
-    """What the reference values of the factors are called."""
+    """Name for the reference values of the factors."""
 
     @property
     def low(self) -> Array:
@@ -88,25 +88,26 @@ class FittedTarget:
 
     @property
     def chosen(self) -> list[float] | None:
-        """The optimum in the order of the factors (natural); None before there is one."""
+        """The optimum in the order of the factors (natural values); None before there is one."""
         return None if self.optimum is None else [self.optimum.values[factor.path] for factor in self.factors]
 
     @property
     def chosen_name(self) -> str:
-        """What the chosen point is called."""
+        """Name of the chosen point."""
         return "optimum" if self.optimum is None or all_identified(self.optimum) else BY_RULE
 
     @property
     def section_point(self) -> list[float]:
-        """Where sections through the surface are laid (natural): the optimum, or the middle of the region before it."""
+        """Point of sections through the surface (natural values): the optimum, before it the middle of the region."""
         return self.chosen or self.model.region.centre.tolist()
 
 
 @dataclass(frozen=True)
 class PairPanel:
-    """A panel over two factors, the first to the right: their numbers, and the sizes of their units [SI].
+    """A panel over two factors, the first along x: their numbers, and the sizes of their units [SI].
 
-    ``axes``: what puts a trace into it; ``in_legend``: whether it is the first of its row, whose traces the legend has.
+    ``axes``: keys that put a trace into it; ``in_legend``: whether it is the first of its row, whose traces the legend
+    lists.
     """
 
     pair: tuple[int, int]
@@ -116,7 +117,7 @@ class PairPanel:
 
 
 def pair_panels(fitted: FittedTarget) -> tuple[list[PairPanel], Json]:
-    """A panel for each pair of factors, of which there is one at least, side by side, and the layout of their axes."""
+    """A panel for each pair of factors (at least one), side by side, and the layout of their axes."""
     factors = fitted.factors
     pairs = list(combinations(range(len(factors)), 2))
     panels: list[PairPanel] = []
@@ -143,7 +144,7 @@ def chosen_star(fitted: FittedTarget, panel: PairPanel) -> list[Json]:
 
 
 def fitted_targets(result: AnyStudy) -> tuple[FittedTarget, ...]:
-    """One per target of a study; none before its surface."""
+    """One per target of a study; none before its response surface."""
     if result.surface is None:
         return ()
     return tuple(_fitted(result.surface, k, target, result.optimum) for k, target in enumerate(result.study.targets))
@@ -163,7 +164,7 @@ def _fitted(surface: SurfaceResult, k: int, target: Target, optimum: OptimumResu
 
 
 def profiler(fitted: FittedTarget, natural: Sequence[float]) -> Spec:
-    """One row per factor: the mean of the target over its range, the others at ``natural`` (SI), band 95 %."""
+    """One row per factor: mean of the response over its range, the others at ``natural`` (SI), band 95 %."""
     factors, unit = fitted.factors, unit_of_observable(fitted.observable)
     here = fitted.model.region.coded(natural)
     k, coded = len(factors), np.linspace(-1.0, 1.0, TRACE_POINTS)
@@ -201,7 +202,7 @@ def profiler(fitted: FittedTarget, natural: Sequence[float]) -> Spec:
 
 
 def _row(row: int, rows: int, title: str, limits: list[float]) -> Json:
-    gap = min(ROW_GAP, 0.5 / rows)  # the rows keep at least half of the height, however many
+    gap = min(ROW_GAP, 0.5 / rows)  # the rows keep at least half of the height, however many there are
     height = (1.0 - gap * (rows - 1)) / rows
     top = 1.0 - row * (height + gap)
     return {
@@ -221,13 +222,13 @@ def _goal(row: int, goal: float, margin: float) -> list[Json]:
 
 
 def prediction(fitted: FittedTarget, natural: Sequence[float]) -> tuple[float, float]:
-    """Mean of the model at ``natural`` (SI) and half its 95 % interval, in the unit of the screen."""
+    """Mean of the model at ``natural`` (SI) and half its 95 % interval, in the displayed unit."""
     here, unit = fitted.model.region.coded(natural), unit_of_observable(fitted.observable)
     return unit.of(float(fitted.model.predict(here))), unit.of(float(fitted.model.half_width(here)))
 
 
 def cloud(fitted: FittedTarget) -> Spec:
-    """The chosen point of every bootstrap refit, for each pair of factors, with the optimum and the measured values."""
+    """The chosen point of every bootstrap refit, for each pair of factors, with optimum and measured values."""
     assert fitted.optimum is not None
     sizes = np.array([unit_of_parameter(factor.path).size for factor in fitted.factors])
     found = fitted.optimum.single
@@ -248,11 +249,11 @@ def cloud(fitted: FittedTarget) -> Spec:
 
 
 def ranges(fitted: FittedTarget) -> Spec:
-    """Per factor, as a share of its screened range: region, what the targets leave of it, optimum, measured value.
+    """Per factor, as a share of its screened range: region, what the targets allow, optimum, measured value.
 
-    One target leaves the range that gives it, and of an identified factor the 95 % set of its optimum; several leave
-    the 95 % interval of their posterior, or without one say what the first does alone. The point of a factor that is
-    not identified is a hollow star.
+    One target allows the range that gives it and, for an identified factor, the 95 % set of its optimum. Several allow
+    the 95 % interval of their posterior; without a posterior, what the first target alone allows is shown. The point of
+    a factor that is not identified is a hollow star.
     """
     assert fitted.optimum is not None
     assert fitted.chosen is not None
@@ -308,11 +309,11 @@ def ranges(fitted: FittedTarget) -> Spec:
 
 
 def _where(shown: Sequence[bool], values: Sequence[float] | Array) -> Array:
-    """The values that are shown, NaN for the others."""
+    """The values that are shown; NaN for the others."""
     return np.where(shown, values, math.nan)
 
 
 def _share(factor: Factor, value: float) -> float:
-    """Place of a value in the screened range of its factor [%]."""
+    """Position of a value in the screened range of its factor [%]."""
     low, high = float(factor.low), float(factor.high)
     return 100.0 * (float(value) - low) / (high - low)

@@ -1,4 +1,4 @@
-"""Charts of what several targets say together: their contours over each other, and the posterior of the factors."""
+"""Charts of what several targets say together: their contours superimposed, and the posterior of the factors."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from explorer.report.figures.surface import GRID, section, sides
 from explorer.units import axis_title, observable_label, parameter_range, unit_of_parameter
 
 COLOURS = (TARGET, ASSUMPTION, FACTOR, DUMMY, CHOSEN)
-"""Of the targets, in their order; from the sixth on again."""
+"""Colours of the targets, in their order; repeated from the sixth on."""
 WITHIN = "rgba(39, 164, 119, 0.28)"
 FAINT_TO_FULL = [[0.0, "rgba(101, 110, 224, 0)"], [1.0, FACTOR]]
 
@@ -49,7 +49,7 @@ def overlaid(targets: Sequence[FittedTarget]) -> Spec:
         x, y = sides(first, panel, GRID)
         missed = [_missed(one, panel.pair) for one in targets]
         flat: Json = {"type": "contour", "x": x, "y": y, "showscale": False, "hoverinfo": "skip", **panel.axes}
-        # plotly shades where a constraint does not hold.
+        # plotly shades the region where a constraint does not hold.
         inside = {"type": "constraint", "operation": ">", "value": 1.0}
         traces.append(
             flat

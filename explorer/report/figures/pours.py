@@ -1,4 +1,4 @@
-"""Charts of pours: noise of the estimators, and means beside the target along ascent, scan and verification."""
+"""Charts of pours: noise of the estimators, and means beside the target in ascent, scan and verification."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ from explorer.units import (
 def noise_of_estimators(pilot: PilotResult) -> Spec:
     """σ with its 95 % interval, d′ per declared change with its interval, and the range of the bias, in panels.
 
-    Only estimators in the unit of the first, the target's own, share the axis.
+    Only estimators in the unit of the first, which is the target's own, share the axis.
     """
     own = unit_of_observable(next(iter(pilot.noise))).symbol
     estimators = [name for name in pilot.noise if unit_of_observable(name).symbol == own][::-1]
@@ -126,7 +126,7 @@ def _separations(choice: EstimatorChoice, rows: dict[str, str], panel: int) -> l
 
 
 def _interval(bars: list[tuple[float, float, float]], size: float, colour: str) -> Json:
-    """Error bars from (value, low, high), given in a unit ``size`` times smaller than drawn."""
+    """Error bars from (value, low, high), given in a unit ``size`` times smaller than the drawn one."""
     return {
         "type": "data",
         "symmetric": False,
@@ -144,7 +144,7 @@ def _cycle(count: int) -> list[str]:
 
 
 Look = tuple[str, str, str]
-"""Colour of a line, of its band, and dash."""
+"""Colours of a line and its band, and dash."""
 REFERENCE_BAND = "rgba(212, 120, 40, 0.18)"
 NORMAL_95 = 1.96
 FAINT = 0.45
@@ -155,7 +155,7 @@ SIMULATED = 2.0
 def ascent_path(walk: AscentResult, seen: TargetWalk, target: Target) -> Spec:
     """Mean per step with its 95 % interval, single runs, the first-order prediction, and the target with margin.
 
-    ``seen``: what ``walk`` gave in the observable of ``target``.
+    ``seen``: the result of ``walk`` in the observable of ``target``.
     """
     unit = unit_of_observable(seen.observable)
     steps = list(range(1, len(seen.means) + 1))
@@ -195,7 +195,7 @@ def ascent_path(walk: AscentResult, seen: TargetWalk, target: Target) -> Spec:
 
 
 def profile(words: str, x: Sequence[float], mean: Sequence[float], sd: Sequence[float], look: Look) -> list[Json]:
-    """A mean height with its band of one standard deviation, in the unit of its numbers; gaps where it is NaN."""
+    """A mean height with a band of one standard deviation, in the unit of its numbers; gaps at NaN."""
     colour, band, dash = look
     known = [
         (at, middle - spread, middle + spread)
@@ -235,7 +235,7 @@ def pile_outlines(
     measured: Mapping[str, tuple[Sequence[float], Sequence[float]]],
     behind: Backdrop | None = None,
 ) -> Spec:
-    """Mean silhouettes with bands, and photographed outlines (name → u, z [m]) over them, on one scale [mm]."""
+    """Mean silhouettes with bands and, over them, photographed outlines (name → u, z [m]), on one scale [mm]."""
     looks = {"reference": (ASSUMPTION, REFERENCE_BAND, "dot"), "optimum": (FACTOR, INTERVAL_BAND, "dash")}
     traces: list[Json] = []
     for pile in piles:
@@ -291,7 +291,7 @@ def verification(stage: VerificationResult, index: int) -> Spec:
     target, tests = stage.targets[index], stage.tests[index]
     unit = unit_of_observable(target.observable)
     pours = [unit.of(value) for value in valid_values(stage.runs, target.observable)]
-    # Spread over a strip so that equal values stay visible; the place across means nothing.
+    # Spread over a strip so that equal values stay visible; the horizontal position has no meaning.
     places = [SIMULATED + 0.14 + 0.22 * k / max(1, len(pours) - 1) for k in range(len(pours))]
     traces = [points(places, pours, "fresh pours", FACTOR, marker={"size": 7, "opacity": 0.6})]
     for name, x, sample, colour in (

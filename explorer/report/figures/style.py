@@ -1,7 +1,7 @@
-"""Colours and parts that the charts share.
+"""Colours and elements that the charts share.
 
-Every colour reads on a light and on a dark page, and any two are told apart also by people with the common forms of
-colour blindness (a test holds both).
+Every colour is legible on a light and on a dark page, and people with the common forms of colour blindness can also
+tell any two apart (a test checks both).
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ DUMMY = "#8b86a3"
 TARGET = "#27a477"
 CHOSEN = "#d73349"
 INK = "#2b2f34"
-"""Lines on a filled ground that is light on every page."""
+"""Lines on a filled area that is light on every page."""
 MARGIN_BAND = "rgba(39, 164, 119, 0.08)"
 INTERVAL_BAND = "rgba(101, 110, 224, 0.22)"
 CLOUD = "rgba(101, 110, 224, 0.4)"
 BELOW_TO_ABOVE = [[0.0, FACTOR], [0.5, "#efece6"], [1.0, ASSUMPTION]]
 """Colour scale of a surface: below, at and above the target."""
 LEAST_SPREAD = 1e-9
-"""Spread relative to the largest number below which it is rounding."""
+"""Spread relative to the largest number below which it counts as rounding."""
 
 
 CONFIG: Json = {
@@ -44,8 +44,8 @@ CONFIG: Json = {
 """plotly.js's options for every chart, in a report and on the live page; its picture button gives SVG, for print.
 
 By default plotly.js 4 (plotly 7) offers "Share chart…", which uploads the data to cloud.plotly.com, and a logo that
-links to plotly.com. Charts hold unpublished data, so both are off. The library's text keeps that address as a default;
-the empty plotlyServerURL overrides it, and the button's own code stops where there is none.
+links to plotly.com. Charts hold unpublished data, so both are off. The library's code keeps that address as a default;
+the empty plotlyServerURL overrides it, and the button's own code stops if there is none.
 """
 
 
@@ -55,7 +55,7 @@ def label(text: str) -> str:
 
 
 def chart(traces: list[Json], layout: Json, height: int = 380) -> Spec:
-    """A chart from its traces; margins and legend as in all others."""
+    """A chart from its traces, with the same margins and legend as all others."""
     common: Json = {
         "height": height,
         "margin": {"l": 60, "r": 24, "t": 28, "b": 52},
@@ -66,7 +66,7 @@ def chart(traces: list[Json], layout: Json, height: int = 380) -> Spec:
 
 
 def axis(title: str, **more: Any) -> Json:
-    """An axis with a title; very small and large numbers as powers of ten, by default they would be 20n and 1B."""
+    """An axis with a title; very small and large numbers as powers of ten (the default would be 20n and 1B)."""
     return {"title": {"text": label(title)}, "automargin": True, "exponentformat": "power", **more}
 
 
@@ -77,7 +77,7 @@ def side_by_side(panels: int, gap: float = 0.06) -> list[list[float]]:
 
 
 def stacked(spec: Spec, gap: float = 0.16) -> Spec:
-    """A chart of panels in a row as panels one below the other, for a narrow place; a shared y axis is repeated."""
+    """A chart with its row of panels stacked in a column, for a narrow place; a shared y axis is repeated."""
     layout = dict(spec["layout"])
     panels = sum(1 for key in layout if key.startswith("xaxis"))
     height = (1.0 - gap * (panels - 1)) / panels
@@ -99,9 +99,9 @@ def stacked(spec: Spec, gap: float = 0.16) -> Spec:
 
 
 def short_rows(spec: Spec) -> Spec:
-    """The same with the names of the rows cut at " · ", and without a beginning that all share, for a narrow place.
+    """A chart with row names cut at " · " and without a beginning common to all, for a narrow place.
 
-    Hovering still tells all.
+    Hovering still shows the full names.
     """
     rows = dict.fromkeys(row for trace in spec["data"] for row in trace["y"] if isinstance(row, str))
     names = [row.split(" · ")[0] for row in rows]
@@ -114,20 +114,21 @@ def short_rows(spec: Spec) -> Spec:
 
 
 def finite(values: Iterable[float]) -> list[float | None]:
-    """Numbers for a chart: None, which leaves a gap, for one that is not there."""
+    """Numbers for a chart: None, which leaves a gap, for a missing one."""
     return [float(value) if math.isfinite(value) else None for value in values]
 
 
 def rounded(values: npt.NDArray[np.floating[Any]]) -> list[Any]:
-    """The numbers of a grid or a curve to at least a hundred-thousandth of their spread: short in a file, exact on any
-    screen, however small or large they are.
+    """The numbers of a grid or a curve, rounded to a hundred-thousandth of their spread or finer.
+
+    They are short in a file and exact on any screen, however small or large they are.
     """
     spread = max(float(np.ptp(values)), LEAST_SPREAD * float(np.abs(values).max()))
     return np.round(values, 5 - math.floor(math.log10(spread)) if spread else 0).tolist()
 
 
 def suffix(panel: int) -> str:
-    """What plotly puts behind "x" and "y" for a panel: nothing for the first, then "2", "3", …"""
+    """What plotly appends to "x" and "y" for a panel: nothing for the first, then "2", "3", …"""
     return "" if panel == 0 else str(panel + 1)
 
 
@@ -138,7 +139,7 @@ def points(x: list[Any], y: list[Any], name: str, colour: str, **more: Any) -> J
 
 
 def error_bars(half_widths: Sequence[float], colour: str) -> Json:
-    """Symmetric intervals; none where the half-width is not known."""
+    """Symmetric intervals; none if the half-width is not known."""
     widths = [width if math.isfinite(width) else 0.0 for width in half_widths]
     return {"type": "data", "array": widths, "color": colour, "thickness": 1.5, "width": 4}
 
@@ -167,6 +168,6 @@ def line(colour: str, dash: str = "solid", width: float = 1.5) -> Json:
 
 
 def note(text: str, x: float, y: float, panel: int = 0, **more: Any) -> Json:
-    """A short text at a place of a panel; y counts in shares of its height."""
+    """A short text at a place in a panel; y is a share of its height."""
     place = {"xref": f"x{suffix(panel)}", "yref": f"y{suffix(panel)} domain", "x": x, "y": y}
     return {"text": label(text), "showarrow": False, "font": {"size": 11}, **place, **more}

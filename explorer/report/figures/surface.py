@@ -1,6 +1,6 @@
 """Charts of a response surface: contours through the optimum, the fit and its residuals, and the surface in space.
 
-In space it is a height over two factors, and the settings that give the target among three.
+In space, it is a height over two factors, or the settings of three factors that give the target.
 """
 
 from __future__ import annotations
@@ -34,14 +34,13 @@ from explorer.report.figures.style import (
 from explorer.units import axis_title, counted, observable_title, unit_of_observable, unit_of_parameter
 
 GRID, SOLID_GRID, CUBE = 41, 25, 17
-"""Points along each side of the grids: in a plane, of a height in space, of a body in space."""
+"""Points along each side of the grids: in a plane, for a height in space, for a body in space."""
 
 
 def contours(fitted: FittedTarget) -> Spec:
     """The surface of a target over each pair of factors, the others at the optimum (before it: the middle).
 
-    Runs of the design are projected on each panel; the thick line is where the model gives the target, where there is
-    one.
+    Runs of the design are projected onto each panel; the thick line, if there is a target, is where the model gives it.
     """
     unit = unit_of_observable(fitted.observable)
     panels, axes = pair_panels(fitted)
@@ -74,7 +73,7 @@ def contours(fitted: FittedTarget) -> Spec:
 
 
 def sides(fitted: FittedTarget, panel: PairPanel, points_along: int) -> tuple[list[float], list[float]]:
-    """Places along both sides of a panel, from end to end of the region, in the units of the screen."""
+    """Positions along both sides of a panel, from end to end of the region, in the displayed units."""
     region, coded = fitted.model.region, np.linspace(-1.0, 1.0, points_along)
     x, y = (
         ((region.centre[k] + region.half_width[k] * coded) / size).tolist()
@@ -84,8 +83,9 @@ def sides(fitted: FittedTarget, panel: PairPanel, points_along: int) -> tuple[li
 
 
 def section(fitted: FittedTarget, pair: tuple[int, int], side: int) -> Array:
-    """The model [SI] on a grid over a pair of factors, the first along the columns, ``side`` points each, the others at
-    the section.
+    """The model [SI] on a grid over a pair of factors, ``side`` points each, the first along the columns.
+
+    The other factors are at the point of the section.
     """
     i, j = pair
     fixed = fitted.model.region.coded(fitted.section_point)
@@ -95,7 +95,7 @@ def section(fitted: FittedTarget, pair: tuple[int, int], side: int) -> Array:
 
 
 def _marks(fitted: FittedTarget, panel: PairPanel) -> list[Json]:
-    """Runs of the design, the measured parameters where they lie in the region, and the optimum if there is one."""
+    """Runs of the design, the measured parameters if they lie in the region, and the optimum if there is one."""
     pair, sizes = list(panel.pair), np.array(panel.sizes)
     natural = fitted.design[:, pair] / sizes
     reference = np.array([float(fitted.factors[k].reference) for k in pair]) / sizes
@@ -147,7 +147,7 @@ def fit(fitted: FittedTarget) -> Spec:
 
 
 def residual_quantiles(fitted: FittedTarget) -> Spec:
-    """Studentized residuals over the quantiles of t that a right model would give them, and the line y = x."""
+    """Studentized residuals over the quantiles of t that a correct model would give them, and the line y = x."""
     df = fitted.model.df_residual
     known = sorted(r for r in fitted.anova.studentized_residuals.tolist() if math.isfinite(r))
     # Externally studentized residuals follow t with one degree of freedom less than the error.

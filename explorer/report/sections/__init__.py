@@ -46,6 +46,6 @@ AT_THE_END: tuple[Callable[[StudyResult], Section | None], ...] = (paper, method
 
 
 def sections_of(result: StudyResult) -> tuple[Section, ...]:
-    """Every section that ``result`` has something for."""
+    """Every section for which ``result`` has content."""
     own, last = ((make(result) for make in makers) for makers in (STAGES_FOUND, AT_THE_END))
     return tuple(section for section in (*own, *further(result), *last) if section is not None)

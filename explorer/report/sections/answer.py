@@ -1,4 +1,4 @@
-"""The answer of a study: in short, the verification of it, what moves the response, and the optimum."""
+"""The answer of a study: in short, its verification, what moves the response, and the optimum."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from explorer.units import (
 
 
 def banner(result: StudyResult) -> Banner:
-    """Whether the material is calibrated: fresh pours decide, and a surface that is mere noise decides nothing."""
+    """Whether the material is calibrated: fresh pours decide; a surface that is only noise decides nothing."""
     single, targets, tests = result.optimum.single, result.study.targets, result.verification.tests
     verdicts = {one.verdict for one in tests}
     poured, said = _poured(targets, tests), _said(targets, tests)
@@ -107,7 +107,7 @@ def banner(result: StudyResult) -> Banner:
 
 
 def _poured(targets: Sequence[Target], tests: Sequence[Verification]) -> str:
-    """What the fresh pours gave beside what was measured, of every target."""
+    """For every target, what the fresh pours gave beside what was measured."""
     pairs = [
         f"{observed(one.observable, test.simulated.mean)} against {observed(one.observable, one.mean)} measured"
         for one, test in zip(targets, tests, strict=True)
@@ -119,7 +119,7 @@ def _poured(targets: Sequence[Target], tests: Sequence[Verification]) -> str:
 
 
 def _said(targets: Sequence[Target], tests: Sequence[Verification]) -> str:
-    """The verdict on one target, or in short on each of several."""
+    """The verdict on one target, or the short verdicts on several."""
     if len(targets) == 1:
         return verdict(targets[0], tests[0])
     pairs = zip(targets, tests, strict=True)
@@ -136,7 +136,7 @@ def holds(result: StudyResult) -> bool:
 
 
 def parameters(result: StudyResult) -> Section:
-    """The calibrated parameters; struck out where the verdict says that they are none."""
+    """The calibrated parameters; struck out if the verdict says that they are not calibrated."""
     good = holds(result)
     rows = []
     for one in settings(result.optimum):
@@ -153,7 +153,7 @@ def parameters(result: StudyResult) -> Section:
 
 
 def overview(result: StudyResult) -> Section:
-    """The study in a few lines, the warnings that belong to them, and the resolution of every stage."""
+    """The study in a few lines, with the warnings that go with them, and the resolution of every stage."""
     blocks: list[Block] = [Facts(tuple(_facts(result)))]
     blocks += [Caution(text) for text in cautions(result)]
     blocks.append(_resolutions(result))
@@ -161,7 +161,7 @@ def overview(result: StudyResult) -> Section:
 
 
 def cautions(result: StudyResult) -> list[str]:
-    """What keeps the numbers of this study from meaning more than they do, one sentence each."""
+    """Limits on the meaning of the numbers of this study, one sentence each."""
     found = []
     fallback = [s.name for s in result.screening.selected if not s.reason.startswith(SIGNIFICANT)]
     if fallback:
@@ -202,7 +202,7 @@ def cautions(result: StudyResult) -> list[str]:
 
 
 def precision_cautions(target: Target, test: Verification) -> list[str]:
-    """Where an error is smaller than what the replicates can show, and where a spread was not measured."""
+    """Notes where an error is smaller than the replicates can show, or a spread was not measured."""
     found = []
     error, spread = test.relative_error_percent, test.simulated.standard_error
     name = observable_label(target.observable)
@@ -326,7 +326,7 @@ def _of_screening(screening: ScreeningResult, response: str) -> str:
 
 
 def verification(result: StudyResult) -> Section:
-    """Per target: samples, tests, equivalence, relative error beside the noise."""
+    """Per target: samples, tests, equivalence, and relative error beside the noise."""
     stage = result.verification
     seeds = len({run.seed for run in stage.runs})
     blocks: list[Block] = [
@@ -341,7 +341,7 @@ def verification(result: StudyResult) -> Section:
 
 
 def piles(result: StudyResult) -> Section | None:
-    """Mean silhouettes at the reference setting and at the optimum; None where none was kept."""
+    """Mean silhouettes at the reference setting and at the optimum; None if none were kept."""
     found = result.piles
     if not found:
         return None
@@ -368,7 +368,7 @@ def _of_target(stage: VerificationResult, index: int, target: Target, test: Veri
 
 
 def verdict(target: Target, test: Verification) -> str:
-    """The outcome in one sentence, the equivalence test first: no difference found is no proof of agreement."""
+    """The outcome in one sentence, the equivalence test first: finding no difference does not prove agreement."""
     name, deciding = target.observable, test.deciding
     words = f"{_outcome(target, test)}{'; more pours are needed to tell' if test.verdict == 'cannot tell' else ''}."
     if deciding is None or math.isnan(deciding.low):
@@ -454,7 +454,7 @@ def _difference(name: str, value: float) -> str:
 
 
 def effects(result: StudyResult) -> Section:
-    """All effects in one chart, and what the calibration hangs on."""
+    """All effects in one chart, and what the calibration depends on."""
     response = observable_label(result.screening.response)
     text = f"Effects on {response}, each over its own range, with 95 % intervals."
     blocks: list[Block] = [Text(text)]

@@ -1,4 +1,4 @@
-"""What was run to get there: the pilot's noise, the screening, and what the source does not state."""
+"""The runs before the optimum: the pilot's noise, the screening, and what the source does not state."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def noise(result: StudyResult) -> Section:
 
 
 def reach(result: StudyResult) -> Section | None:
-    """The two corners of the factors of known direction; None where they were not poured."""
+    """The two corners of the factors of known direction; None if they were not poured."""
     found = result.reach
     if found is None:
         return None
@@ -132,7 +132,7 @@ def _estimators(pilot: PilotResult) -> Table:
 
 
 def _separation(found: Separation | None) -> str:
-    """Signed d′ with its interval; an observable of another kind than the target's was not compared."""
+    """Signed d′ with its interval; an observable of a kind other than the target's was not compared."""
     if found is None:
         return MISSING
     return f"{signed(found.d_prime)} ({signed(found.low)} … {signed(found.high)})"
@@ -146,7 +146,7 @@ def _bias_range(name: str, readings: Sequence[tuple[float, float]]) -> str:
 
 
 def _choice(choice: EstimatorChoice) -> str:
-    """Why the screening reads what it reads."""
+    """Why the screening uses its estimator."""
     own, best = observable_label(choice.default), observable_label(choice.best)
     if choice.default in choice.excluded:
         text = f"The target's own, {own}, is left out for its bias; of the others this one has the largest mean d′."
@@ -212,7 +212,7 @@ def screening(result: StudyResult) -> Section:
 
 
 def not_testable(part: ScreeningResult) -> list[Block]:
-    """Which factors act on so few bodies that their effect says nothing; empty if none does."""
+    """Factors that act on so few bodies that their effect says nothing; empty if there are none."""
     if not part.not_testable:
         return []
     names = tuple(
@@ -224,7 +224,7 @@ def not_testable(part: ScreeningResult) -> list[Block]:
 
 
 def effect_table(part: ScreeningResult) -> Table:
-    """Effects by falling size with their tests; the last column reads the same pours in the target's observable."""
+    """Effects by decreasing size with their tests; the last column is for the target's observable of the same pours."""
     analysis = part.analysis
     size = unit_of_observable(part.response).size
     factors = {factor.name: factor for factor in part.factors}
@@ -334,7 +334,7 @@ def _no_pile_note(part: ScreeningResult) -> str:
 
 
 def assumptions(result: StudyResult) -> Section | None:
-    """Effects of the assumptions and what is assumed; None where nothing is."""
+    """Effects of the assumptions and what is assumed; None if nothing is."""
     part, assumed = result.assumptions, result.study.assumed
     blocks: list[Block] = []
     if part is not None:
@@ -364,7 +364,7 @@ def assumptions(result: StudyResult) -> Section | None:
 
 
 def scan(result: StudyResult) -> Section | None:
-    """The response over one assumption in steps; None where the study declares no scan."""
+    """The response over one assumption in steps; None if the study declares no scan."""
     scanned = result.scan
     if scanned is None:
         return None

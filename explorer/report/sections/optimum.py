@@ -1,4 +1,4 @@
-"""The optimum of a study: the chosen setting, what the targets leave of each factor, and how well that is known."""
+"""The optimum of a study: the chosen setting, what the targets allow for each factor, and how well that is known."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def optimum(result: StudyResult) -> Section:
 
 
 def ranges_caption(found: OptimumResult, n: str) -> str:
-    """What the bars of the ranges are; ``n``: of what, how many, the model was fitted to."""
+    """What the bars of the ranges mean; ``n``: what the model was fitted to, and how many."""
     single, several = found.single, found.compromise is not None
     bars = ["wide, the region of the surface"]
     if several and found.posterior is not None:
@@ -173,7 +173,7 @@ def _compromise(result: StudyResult, compromise: Compromise) -> list[Block]:
 
 
 def _readings(result: StudyResult) -> int:
-    """Of all targets, that the surfaces are fitted to."""
+    """Number of readings, over all targets, to which the surfaces are fitted."""
     return sum(model.observed.size for model in result.surface.models)
 
 

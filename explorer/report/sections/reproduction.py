@@ -1,6 +1,7 @@
-"""The end of the report: stages of other packages, the paper's numbers beside ours, how to run it all again.
+"""The end of the report: stages of other packages, the paper's numbers beside ours, and how to run it all again.
 
-Source of the paper's: Processes 2022, 10, 185. Its tables are assets; what stands only in its text (section 3) is here.
+Source of the paper's numbers: Processes 2022, 10, 185. Its tables are assets; numbers found only in its text
+(section 3) are here.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from solver.laws import CONTACT_LAWS, HertzMindlin
 
 
 def further(result: StudyResult) -> tuple[Section, ...]:
-    """Line, named findings, notes and the number of runs of every stage that this program does not have itself."""
+    """Line, named findings, notes and number of runs of every stage from another package."""
     return tuple(_section(result, name) for name in result.further)
 
 
@@ -47,7 +48,7 @@ def _section(result: StudyResult, name: str) -> Section:
         blocks.append(Facts((*facts, ("Runs", str(runs)))))
     if found.notes:
         blocks.append(Bullets(found.notes))
-    # A result may be read where the package that made it is not installed.
+    # A result may be read on a machine without the package that made it.
     stage = STAGES.get(name)
     return Section(name.replace("_", " ").capitalize() if stage is None else stage.title, tuple(blocks))
 
@@ -167,7 +168,7 @@ def runs(result: StudyResult) -> Section:
         Table(("stage", *(name.replace("_", " ") for name in names), "pours"), tuple(rows)),
     ]
     if contact := result.study.contact:
-        # Results of before there were several have no name of one.
+        # Results from before there were several laws name none.
         law = contact.get("law", HertzMindlin.name)
         title = CONTACT_LAWS[law].title if law in CONTACT_LAWS else law
         named = ", ".join(f"{name.replace('_', ' ')} {choice}" for name, choice in contact.items() if name != "law")
@@ -200,7 +201,7 @@ def repeat(result: StudyResult) -> Section:
 
 
 def _study(study: StudyDescription) -> str:
-    """The study as the command line takes it: its name if it is shipped, else its file."""
+    """The study as an argument of the command line: its name if it is shipped, else its file."""
     shipped = study.name in shipped_assets("studies") and Path(study.file).parent.name == "studies"
     return study.name if shipped else shlex.quote(study.file)
 

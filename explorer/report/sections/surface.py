@@ -1,4 +1,4 @@
-"""The steepest ascent, and the response surface around where it passes the target: equations, ANOVA, fit."""
+"""The steepest ascent, and the response surface around its crossing of the target: equations, ANOVA, fit."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def ascent(result: StudyResult) -> Section:
 
 
 def _joint_steps(walk: AscentResult, found: Approach) -> Table:
-    """How far every step misses the targets together."""
+    """By how much each step misses the targets taken together."""
     labels = [f"{observable_label(one.observable)} [standard errors]" for one in walk.walks]
     rows = tuple(
         (str(k + 1), *(signed(missed) for missed in misses), fixed(misfit), fixed(desirable))
@@ -136,7 +136,7 @@ def surface(result: StudyResult) -> Section:
 
 
 def equation(model: Surface | NameGroup, factors: Sequence[Factor], observable: str) -> tuple[str, str]:
-    """The model as text, coded (x from −1 to +1) and in the units that people read."""
+    """The model as text, coded (x from −1 to +1) and in display units."""
     unit = unit_of_observable(observable)
     terms, scales = _terms([factor.name for factor in factors], [unit_of_parameter(f.path).size for f in factors])
     coded = [unit.of(value) for value in model.coefficients.tolist()]
@@ -147,7 +147,7 @@ def equation(model: Surface | NameGroup, factors: Sequence[Factor], observable: 
 
 
 def anova_table(anova: SurfaceAnova) -> Table:
-    """Analysis of variance as published calibrations print it."""
+    """Analysis of variance in the form that published calibrations print."""
     return variance_table(anova.rows, "Partial sums of squares.")
 
 

@@ -1,1 +1,1 @@
-"""Boards: the results of a study or a diagnosis, finished or at work, as one page of verdict, charts and tables."""
+"""Boards: the results of a study or diagnosis, finished or running, as one page of verdict, charts and tables."""

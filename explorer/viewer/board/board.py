@@ -1,4 +1,4 @@
-"""What a board shows, as typed values, and as the JSON that the page ``/shell/board.html`` draws."""
+"""The content of a board, as typed values and as the JSON that the page ``/shell/board.html`` draws."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CODE = re.compile(r"`([^`]*)`")
 
 @dataclass(frozen=True)
 class BoardChart:
-    """One chart: ``aspect`` is its height by its width."""
+    """One chart: ``aspect`` is height over width."""
 
     title: str
     spec: Spec
@@ -27,7 +27,7 @@ class BoardChart:
 
 @dataclass(frozen=True)
 class BoardTable:
-    """A table that a reader sorts and filters; ``opens`` has a command per row that opens it in the scene, or none."""
+    """A table that can be sorted and filtered; ``opens`` has a command per row that opens it in the scene, or none."""
 
     title: str
     table: Table
@@ -37,7 +37,7 @@ class BoardTable:
 
 @dataclass(frozen=True)
 class Stage:
-    """How far one stage is: "12 of 28", and what it found."""
+    """Progress of one stage ("12 of 28"), and what it found."""
 
     name: str
     count: str
@@ -47,8 +47,8 @@ class Stage:
 
 @dataclass(frozen=True)
 class BoardAct:
-    """A button below the verdict: its label, the command that it sends (`explorer.viewer.shell.channel`), and the room
-    that it opens, if any."""
+    """A button below the verdict: its label, the command it sends (`explorer.viewer.shell.channel`), and the room it
+    opens, if any."""
 
     label: str
     command: Mapping[str, Any]
@@ -57,22 +57,22 @@ class BoardAct:
 
 @dataclass(frozen=True)
 class Board:
-    """All of a board."""
+    """A complete board."""
 
     title: str
     subtitle: str
     banner: Banner | None = None
     acts: tuple[BoardAct, ...] = ()
-    """What can be done next; not offered where the board stands in no page."""
+    """What can be done next; not offered if the board is not part of a live page."""
     stages: tuple[Stage, ...] = ()
     charts: tuple[BoardChart, ...] = ()
     tables: tuple[BoardTable, ...] = ()
     report: str = ""
-    """Address of the report; empty where there is none."""
+    """Address of the report; empty if there is none."""
 
 
 def made_charts(plots: Plots) -> tuple[BoardChart, ...]:
-    """The charts of ``plots`` that have something to draw."""
+    """The charts of ``plots`` that have content."""
     made = ((title, plot, plot.make()) for title, plot in plots.items())
     return tuple(BoardChart(title, spec, plot.caption, plot.aspect) for title, plot, spec in made if spec is not None)
 

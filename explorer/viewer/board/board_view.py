@@ -1,4 +1,4 @@
-"""A board on the page: a frame in a panel that draws what is published at the board's address."""
+"""A board on the page: a frame in a panel that shows what is published at the board's address."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HEIGHT = "calc(100dvh - 330px)"
 
 
 def published_report(pages: WebPages, folder: Path | None) -> str:
-    """Address of the report in ``folder``, which is served from now on; empty where there is none."""
+    """Address of the report in ``folder``, which is served from now on; empty if there is none."""
     return "" if folder is None or not (folder / REPORT).is_file() else pages.publish_folder(folder) + REPORT
 
 
@@ -47,10 +47,10 @@ class BoardView:
         status: CommandStatus | None,
         make: Callable[[CommandStatus | None, str], Board],
     ) -> None:
-        """The board of the result ``shown`` in ``folder``, anew where it, or how far its command is, has changed.
+        """Show the board of the result ``shown`` in ``folder``, made again if it or its command's progress has changed.
 
-        ``status`` of the command that works on it, None for a result from elsewhere; ``make`` takes that and the
-        address of the report, empty where there is none.
+        ``status``: of the command that works on it, None for a result from elsewhere. ``make`` takes the status and the
+        address of the report, empty if there is none.
         """
         alive = status is not None and status.alive
         progress = (status.state, status.stage, status.done) if status is not None and alive else None
@@ -58,7 +58,7 @@ class BoardView:
         self.offer((shown, progress, reported), lambda: make(status, published_report(self._pages, reported)))
 
     def offer(self, version: Hashable, make: Callable[[], Board]) -> None:
-        """Show what ``make`` gives, unless ``version`` is shown already; put off while another is being made."""
+        """Show what ``make`` gives, unless ``version`` is already shown; deferred while another is being made."""
         if version == self._version or self.busy:
             return
         self._version = version
@@ -69,6 +69,6 @@ class BoardView:
         try:
             board = make()
         except (AssertionError, LookupError, TypeError, ValueError) as error:
-            # A folder that somebody named may hold any JSON, also that of another version.
+            # A folder named by the user may hold any JSON, also that of another version.
             board = Board("This result cannot be shown", f"{type(error).__name__}: {error}")
         self._pages.publish(self._address, WebPage(JSON, board_json(board)))

@@ -1,4 +1,4 @@
-"""The board of a diagnosis: one screen that says what is missing, how sure that is, and shows before and after."""
+"""The board of a diagnosis: one screen that says what is missing and how certain that is, with before and after."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ CORRECTED_ACTS = (
 def diagnosis_board(
     result: DiagnosisResult | None, status: CommandStatus | None, report: str = "", on_page: bool = True
 ) -> Board:
-    """The board of ``result``; ``status`` of the process that works, None where none does.
+    """The board of ``result``; ``status`` of the process at work, None if there is none.
 
-    ``on_page``: it stands in a page whose buttons do what comes next, and not alone.
+    ``on_page``: whether it is part of a page whose buttons do what comes next, rather than alone.
     """
     alive = status is not None and status.alive
     subtitle = working(status) if status is not None and alive else ""
@@ -64,7 +64,7 @@ def diagnosis_board(
 
 
 def _pressed(result: DiagnosisResult) -> Banner:
-    """The verdict; what comes next by the buttons below it where there are any, and not by commands."""
+    """The verdict; if there are buttons below it, they give what comes next, instead of commands."""
     shown = banner(result)
     if result.kind == "ambiguous" and result.next_experiment:
         return replace(shown, then="Pour and measure that, fill it in under Follow-up, above, and answer with it.")

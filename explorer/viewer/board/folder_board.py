@@ -1,4 +1,4 @@
-"""The board of an output folder, whatever kind of result it holds, read again when that has changed."""
+"""The board of an output folder, whatever kind of result it holds; read again when the result has changed."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from explorer.viewer.shell.web_pages import JSON, WebPage, WebPages, folder_id
 class FolderBoard:
     """Publishes the board of ``folder`` at ``address``.
 
-    Raises CommandError, in one line, where it holds neither a study nor a diagnosis, or one of another version.
+    Raises CommandError, in one line, if it holds neither a study nor a diagnosis, or one of another version.
     """
 
     def __init__(self, folder: Path, pages: WebPages) -> None:
@@ -38,7 +38,7 @@ class FolderBoard:
         self.follow()
 
     def follow(self) -> None:
-        """Publish the board anew where a result, its report, or what is left out of it has changed."""
+        """Publish the board again if a result, its report, or its excluded runs have changed."""
         study, diagnosis = self._study.read(self._folder), self._diagnosis.read(self._folder)
         excluded = load_excluded(self._folder)
         shown = (self._study.version, self._diagnosis.version, (self._folder / REPORT).is_file(), excluded)

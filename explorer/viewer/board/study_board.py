@@ -1,4 +1,4 @@
-"""The board of a study: its verdict, its stages, all charts that there are so far, the answers and every run."""
+"""The board of a study: its verdict, its stages, all charts so far, the answers and every run."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ def study_board(
     photographed: PhotographedTarget | None = None,
     excluded: Sequence[ExcludedRun] = (),
 ) -> Board:
-    """The board of ``result``; ``status`` of the process that works on it, None where none does.
+    """The board of ``result``; ``status`` of the process that works on it, None if there is none.
 
-    ``photographed``: the photographs that it was calibrated against; ``excluded``: runs that a person leaves out.
+    ``photographed``: the photographs against which it was calibrated; ``excluded``: runs that the user leaves out.
     """
     alive = status is not None and status.alive
     so_far = (result.partial or "", result.line) if isinstance(result, PartialStudy) else ("", "")
@@ -57,12 +57,12 @@ def study_board(
 
 
 def photographed_of(folder: Path | None) -> PhotographedTarget | None:
-    """The photographs that the study in ``folder`` is calibrated against; None where it is another target."""
+    """The photographs against which the study in ``folder`` is calibrated; None if it has another target."""
     return None if folder is None else load_target(folder / FOLDER)
 
 
 def _beside_photographs(result: AnyStudy, photographed: PhotographedTarget | None) -> Plots:
-    """Measured silhouettes, a photograph behind them, over the poured ones; empty before there are both."""
+    """Measured silhouettes, with a photograph behind them, over the poured ones; empty until there are both."""
     if photographed is None or not isinstance(result, StudyResult) or not result.piles or not photographed.outlines:
         return {}
     outlines, behind = photographed.outlines, photographed.backdrop
@@ -72,7 +72,7 @@ def _beside_photographs(result: AnyStudy, photographed: PhotographedTarget | Non
 
 
 def working(status: CommandStatus) -> str:
-    """Where a command is, in a line."""
+    """The progress of a command, in a line."""
     words = "Paused" if status.state == "paused" else "Running"
     if not status.planned:
         return f"{words}: {status.stage or 'the program loads'}"
@@ -80,7 +80,7 @@ def working(status: CommandStatus) -> str:
 
 
 def stages_of(status: CommandStatus | None, so_far: tuple[str, str] = ("", "")) -> tuple[Stage, ...]:
-    """The stages of a command with how far each is; ``so_far``: a stage, and what it would find if it ended now."""
+    """The stages of a command with their progress; ``so_far``: a stage, and what it would find if it ended now."""
     if status is None:
         return ()
     return tuple(
@@ -99,7 +99,7 @@ def stages_of(status: CommandStatus | None, so_far: tuple[str, str] = ("", "")) 
 
 
 def _answers(result: AnyStudy) -> tuple[BoardTable, ...]:
-    """The parameters that the study leaves, where it has come so far."""
+    """The resulting parameters, if the study has got that far."""
     if result.optimum is None:
         return ()
     rows = tuple(
@@ -112,7 +112,7 @@ def _answers(result: AnyStudy) -> tuple[BoardTable, ...]:
 
 
 def _without(result: AnyStudy, excluded: Sequence[ExcludedRun]) -> tuple[BoardTable, ...]:
-    """What the study would have answered without runs that are left out, and why they are."""
+    """What the study would have answered without the excluded runs, and why they are excluded."""
     if not isinstance(result, StudyResult) or not excluded:
         return ()
     why = Table(("Run left out", "Seed", "Because"), tuple((one.label, str(one.seed), one.reason) for one in excluded))

@@ -1,1 +1,1 @@
-"""The tab "Laboratory": bench readings, photographs, designs of one's own, audits of published studies."""
+"""The tab "Laboratory": bench readings, photographs, users' own designs, audits of published studies."""

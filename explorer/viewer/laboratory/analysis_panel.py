@@ -1,4 +1,4 @@
-"""What the filled sheet of a designed experiment says."""
+"""Analysis of the completed sheet of a designed experiment."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ REDUCTIONS = {
     "by AICc": Reduction.AICC,
     "while p > 0.05": Reduction.P,
 }
-"""Choice → rule by which terms are dropped."""
+"""Choice → rule for dropping terms."""
 FILL_IN = "Fill in this sheet in a table"
 NO_FACTORS = "as the sheet says"
 LABELS = {
@@ -43,7 +43,7 @@ LABELS = {
 
 
 class AnalysisPanel(Panel):
-    """Filled sheet → effects, model, optimum."""
+    """Completed sheet → effects, model, optimum."""
 
     name, tab, title = "analysis", LABORATORY, "Filled sheet → model and optimum"
 
@@ -94,7 +94,7 @@ class AnalysisPanel(Panel):
         analyse.on_click(lambda _: post(self._analyse))
 
     def set_dark(self, dark: bool) -> None:
-        """Charts for a dark page, or a light one."""
+        """Draw the charts for a dark or a light page."""
         self.view.set_dark(dark)
 
     def _analyse(self) -> None:

@@ -1,4 +1,4 @@
-"""An answer on the page: the terminal's text, a picture, charts, the line that repeats it, files to download."""
+"""An answer on the page: the terminal's text, a picture, charts, the command line that repeats it, downloads."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from explorer.viewer.study.plot_view import PlotView
 from explorer.viewer.view import small_html
 
 TIED = re.compile(r"(?<=\d) (?=\S)")
-"""The blank behind a number, which a narrow table must not break at."""
+"""The space after a number, at which a narrow table must not break."""
 LONGEST_ROW = 90
-"""Characters of a line that is shown as it is."""
+"""Longest line [characters] that is shown unchanged."""
 NO_CHARTS = "Charts come with an answer that has any."
 
 
 class AnswerView:
-    """Shows one :class:`CommandResult` at a time; ``waiting`` (plain text) stands there before the first.
+    """Shows one :class:`CommandResult` at a time; ``waiting`` (plain text) is shown before the first.
 
-    An answer that comes with a report leaves it in a new folder in ``reports``, where the room of reports finds it.
+    If an answer has a report, it is kept in a new folder in ``reports``, where the room of reports finds it.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class AnswerView:
                 post(lambda: self._send(client))
 
     def show(self, answer: CommandResult) -> None:
-        """Show ``answer`` in place of the one before."""
+        """Show ``answer`` in place of the previous one."""
         self._answer = answer
         self._versions += 1
         self._text.content = answer_html(answer, self._kept(answer))
@@ -68,12 +68,12 @@ class AnswerView:
                 self._picture = self._gui.add_image(answer.picture, label=None)
 
     def set_dark(self, dark: bool) -> None:
-        """Charts for a dark page, or a light one."""
+        """Draw the charts for a dark or a light page."""
         if self._plots is not None:
             self._plots.dark = dark
 
     def _kept(self, answer: CommandResult) -> str:
-        """Keep the report of ``answer``; what a person is told of it, empty where there is none."""
+        """Keep the report of ``answer``; returns a message for the user, empty if there is no report."""
         made = [content for name, content in answer.files.items() if name.endswith(".html")]
         if self._reports is None or not made:
             return ""
@@ -89,7 +89,7 @@ class AnswerView:
 
 
 def answer_html(answer: CommandResult, kept: str = "") -> str:
-    """Tables that fit a narrow panel, or text in columns, which it scrolls; the command line, selected by one click.
+    """Tables that fit a narrow panel, or scrolled text in columns; and the command line, selected by one click.
 
     ``kept``: where its report is, in words.
     """
@@ -104,14 +104,14 @@ def answer_html(answer: CommandResult, kept: str = "") -> str:
 
 
 def _line_html(line: str) -> str:
-    """A line of columns, between which are two blanks, stays as it is; another one that is long goes on below."""
+    """A line of columns (separated by two spaces) stays as it is; other long lines are wrapped."""
     sentence = len(line) > LONGEST_ROW and "  " not in line.strip()
     style = " style='white-space:pre-wrap; overflow-wrap:anywhere'" if sentence else ""
     return f"<div{style}>{escape(line) or '&nbsp;'}</div>"
 
 
 def _table_html(caption: str, rows: Rows) -> str:
-    """Two columns; lines end between words, and within no number."""
+    """A table of two columns; lines break between words, never inside a number."""
     cell = "padding:0.15em 0.6em 0.15em 0; text-align:left; vertical-align:top; overflow-wrap:normal"
     lines = "".join(
         f"<tr><th scope='row' style='{cell}; font-weight:normal; opacity:0.8'>{escape(name)}</th>"

@@ -1,4 +1,4 @@
-"""Readings of a bench test become parameters, and the pile is poured with them."""
+"""Readings of a bench test become parameters with which the pile is poured."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class BenchPanel(Panel):
                 post(lambda: send_file(client, *template_file(str(self._test.value))))
 
     def set_dark(self, dark: bool) -> None:
-        """Charts for a dark page, or a light one."""
+        """Draw the charts for a dark or a light page."""
         self.view.set_dark(dark)
 
     def _choose(self, test: str) -> None:
@@ -98,7 +98,7 @@ class BenchPanel(Panel):
         self._follow(test)
 
     def _follow(self, test: str) -> None:
-        """Ask for what the test takes."""
+        """Show the inputs that the test takes."""
         self._compression.visible = test == "shear"
         self._left_out.visible = test == "composition"
         self._twin.visible = test in RIGS

@@ -1,4 +1,4 @@
-"""A design of one's own: the sheet of its runs, to be filled in anywhere."""
+"""A user's own design: the sheet of its runs, to be filled in anywhere."""
 
 from __future__ import annotations
 
@@ -57,14 +57,14 @@ LABELS = {f"--{name}": label for name, (label, _) in NUMBERS.items()} | {
 }
 """Option of the command line → label of its field."""
 ANY_DESIGN = ("blocks", "replicates", "seed")
-"""Of these, what every design takes."""
+"""Those that every design takes."""
 NOTHING_KEPT = "none"
 COMMA_TABLE, WORKBOOK_FILE = "CSV with 0,5 and semicolons", "workbook (.xlsx)"
 FORMATS = ("CSV", COMMA_TABLE, WORKBOOK_FILE)
 
 
 class DesignPanel(Panel):
-    """Factors → sheet; asks only for what the chosen design takes."""
+    """Factors → sheet; shows only the inputs that the chosen design takes."""
 
     name, tab, title = "design", LABORATORY, "Your own design → runs"
 
@@ -155,7 +155,7 @@ class DesignPanel(Panel):
         return path.name, path.read_bytes()
 
     def _follow(self) -> None:
-        """Say what the chosen design is for, and ask for what it takes."""
+        """Say what the chosen design is for, and show the inputs that it takes."""
         kind = str(self._kind.value)
         if kind not in DESIGNS:
             raise CommandError(f"design {kind[:60]!r}; allowed: {', '.join(DESIGNS)}")
@@ -164,7 +164,7 @@ class DesignPanel(Panel):
             field.visible = name in DESIGNS[kind].options
 
     def _order(self) -> DesignOrder:
-        """What stands in the form; what is not asked for is as usual."""
+        """The order from the form; hidden inputs have their defaults."""
         numbers = {
             name: whole_or_none(str(box.value), NUMBERS[name][0], FEWEST[name], MOST.get(name))
             for name, box in self._numbers.items()
@@ -202,7 +202,7 @@ class DesignPanel(Panel):
         self._background.start("making the sheet", in_labels(lambda: sheet_result(order, asked), LABELS), self._made)
 
     def _made(self, answer: CommandResult) -> None:
-        """Show the answer; its sheet is the one that is filled in and analysed from now on."""
+        """Show the answer; from now on, its sheet is the one to fill in and analyse."""
         self.view.show(answer)
         for name, content in answer.files.items():
             if name.endswith(SUFFIXES):

@@ -1,4 +1,4 @@
-"""What a person gives to a test of the laboratory: a file (a shipped example, or an upload), and numbers or none."""
+"""The user's inputs for a laboratory test: a file (a shipped example or an upload), and optional numbers."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from explorer.viewer.actions import Post, on_upload
 
 
 class UploadSlot:
-    """A list of examples, to which every upload is added and chosen. ``folder`` keeps what was sent.
+    """A list of examples, to which every upload is added and chosen. ``folder`` keeps the uploads.
 
-    ``follow`` is called with the choice that a person made, by the list or by an upload.
+    ``follow`` is called with the user's choice, from the list or by an upload.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class UploadSlot:
         self._suffixes, self._folder, self._follow = tuple(suffixes), folder, follow
         self._sent: dict[str, Path] = {}
         self._examples = tuple(examples)
-        # In a place of their own, as viser's client shows a button of uploads whether it is visible or not.
+        # In a folder of their own, because viser's client shows an upload button whether it is visible or not.
         self._place = server.gui.add_folder(None)
         with self._place:
             self._choice = server.gui.add_dropdown(label, self._examples, hint=hint)
@@ -57,7 +57,7 @@ class UploadSlot:
 
     @property
     def chosen(self) -> str:
-        """The name of an example, or the path of a file that was sent."""
+        """The name of an example, or the path of an uploaded file."""
         value = str(self._choice.value)
         return str(self._sent.get(value, value))
 
@@ -71,12 +71,12 @@ class UploadSlot:
         self._place.visible = shown
 
     def offer(self, examples: Sequence[str]) -> None:
-        """Other examples than before; the first is chosen unless a file that was sent is."""
+        """Offer other examples; the first is chosen, unless an uploaded file is."""
         self._examples = tuple(examples)
         self._list(str(self._choice.value) if self._choice.value in self._sent else self._examples[0])
 
     def take(self, name: str, content: bytes) -> None:
-        """Add a file that was sent, or made here, and choose it; CommandError where it is none of this kind."""
+        """Add an uploaded or generated file and choose it; raises CommandError if it is not of this kind."""
         path = kept_file(name, content, self._folder, self._suffixes)
         self._sent[path.name] = path
         self._list(path.name)
@@ -88,13 +88,13 @@ class UploadSlot:
 
 
 def positive(entered: object) -> float | None:
-    """A number above zero; None for 0, which stands for none, and for what is no number."""
+    """A number above zero; None for 0, which stands for none, and for anything that is not a number."""
     number = float(entered) if isinstance(entered, int | float) else math.nan
     return number if math.isfinite(number) and number > 0.0 else None
 
 
 def number_or_none(text: str, what: str) -> float | None:
-    """A number that a person typed, None for nothing; CommandError for anything else."""
+    """A typed number, None for nothing; raises CommandError for anything else."""
     if not text.strip():
         return None
     try:
@@ -108,7 +108,7 @@ def number_or_none(text: str, what: str) -> float | None:
 
 
 def whole_or_none(text: str, what: str, least: int, most: int | None) -> int | None:
-    """A whole number that a person typed, None for nothing; CommandError for anything else."""
+    """A typed whole number, None for nothing; raises CommandError for anything else."""
     number = number_or_none(text, what)
     if number is None:
         return None
@@ -119,9 +119,9 @@ def whole_or_none(text: str, what: str, least: int, most: int | None) -> int | N
 
 
 def in_labels(work: Callable[[], CommandResult], labels: Mapping[str, str]) -> Callable[[], CommandResult]:
-    """``work`` whose answer and refusals name the page's ``labels`` in place of the command line's options.
+    """``work``, with the page's ``labels`` in place of command-line options in its answer and refusals.
 
-    A key of ``labels`` may hold a value too, as "--surrogate gp" does. The line that repeats the answer stays as it is.
+    A key of ``labels`` may include a value, such as "--surrogate gp". The command line that repeats the answer is kept.
     """
     longest_first = sorted(labels, key=len, reverse=True)
     option = re.compile(rf"(?:{'|'.join(map(re.escape, longest_first))})(?![\w-])")
@@ -140,5 +140,5 @@ def in_labels(work: Callable[[], CommandResult], labels: Mapping[str, str]) -> C
 
 
 def parts_of(text: str, mark: str) -> tuple[str, ...]:
-    """What a person typed with ``mark`` between: names, terms, conditions."""
+    """Typed names, terms or conditions, separated by ``mark``."""
     return tuple(part for one in text.split(mark) if (part := one.strip()))

@@ -9,7 +9,7 @@ from explorer.viewer.view import small_html
 
 
 class LaboratoryPanel(Panel):
-    """What the tab is for, and what is being done in it."""
+    """What the tab is for, and the job being done in it."""
 
     name, tab = "laboratory", LABORATORY
 
@@ -21,7 +21,7 @@ class LaboratoryPanel(Panel):
         self._state = page.server.gui.add_html("")
 
     def show(self, now: Now) -> None:
-        """What is being done, or the page's last message."""
+        """Show the job being done, or the page's last message."""
         busy = self._background.busy_with
         state = small_html(escape(f"Busy {busy}." if busy else now.notice))
         if self._state.content != state:

@@ -1,4 +1,4 @@
-"""Measured data of one's own: photographs, angles, balance curves and scans of a set-up become what Diagnose takes."""
+"""A user's measured data: photographs, angles, balance curves and scans of a set-up, made into data for Diagnose."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ NOTHING = "No files yet."
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of file: what it is called, what its button says, and what a file's name may end in."""
+    """A kind of file: its name, the text of its button, and the allowed suffixes."""
 
     name: str
     label: str
@@ -64,7 +64,7 @@ LABELS = {
 
 
 class MeasuredDataPanel(Panel):
-    """Names, files, set-up; what was read of them and what it can tell."""
+    """Names, files, set-up; what was read from them and what it can tell."""
 
     name, tab, title = "measured_data", LABORATORY, "Measured data → Diagnose"
 
@@ -143,7 +143,7 @@ class MeasuredDataPanel(Panel):
         folder = self._uploads / name
         changes = tuple(str(self._changes.value).split())
         if any(change.startswith("rig.mesh") for change in changes):
-            # A browser names no file of this machine.
+            # A browser may not name a file of this machine.
             raise CommandError("Set-up: rig.mesh: allowed here: the study's own; use the command line for another")
         asked = NewCondition(
             name=str(self._condition.value).strip(),

@@ -1,4 +1,4 @@
-"""The angle of repose on photographs, with what was read drawn over it, and as the target of the page's study."""
+"""The angle of repose on photographs, with the readings drawn in, and as the target of the page's study."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ OWN = "The study's target is that of its file. What is read off a photograph can
 
 
 class PhotographPanel(Panel):
-    """Picture, scale, lens, answer, target; uploads are kept, and the pours that pictures are compared with."""
+    """Picture, scale, lens, answer, target; uploads are kept, and so are the pours compared with pictures."""
 
     name, tab, title, every = "photograph", LABORATORY, "Photograph → angle of repose", SELDOM
 
@@ -107,7 +107,7 @@ class PhotographPanel(Panel):
         self._remove.on_click(lambda _: post(self._forget))
 
     def show(self, now: Now) -> None:
-        """Tell the target, and which of the buttons mean something now."""
+        """Show the target, and enable the buttons that apply now."""
         target = self._target.now
         kept = "" if target is None else f"Target of the study: {target.line} Kept in {target.folder}."
         text = small_html(escape(kept or OWN))
@@ -123,7 +123,7 @@ class PhotographPanel(Panel):
                 button.disabled = not able
 
     def _follow(self, chosen: str) -> None:
-        """Say what tells lengths on an example; what a person entered stays for his own photographs."""
+        """Show the scale of an example; the user's own entries stay for the user's photographs."""
         ruler = self._rulers.get(chosen, Ruler())
         if chosen in self._rulers or self._ruler() == self._given:
             self._scale.value = ruler.scale_mm or 0.0  # type: ignore[misc]
@@ -134,7 +134,7 @@ class PhotographPanel(Panel):
 
     @property
     def _marks(self) -> Marks:
-        """In the photograph that is chosen; those in another one do not count."""
+        """Marks in the chosen photograph; those in another one do not count."""
         photo, marks = self._marked
         return marks if photo == self._photo.chosen else UNMARKED
 
@@ -154,7 +154,7 @@ class PhotographPanel(Panel):
         self._answer("pouring beside the photograph", lambda read: compared_result(read, scene, folder))
 
     def _answer(self, what: str, result_of: Callable[[PhotographReading], CommandResult]) -> None:
-        """Read the photograph, and show what comes of it; the reading stays for the target."""
+        """Read the photograph and show the result; the reading is kept for the target."""
         photo, ruler, marks = self._photo.chosen, self._ruler(), self._marks
         board = None if self._board.chosen == NO_BOARD else self._board.chosen
 
@@ -169,7 +169,7 @@ class PhotographPanel(Panel):
         self._background.start(what, find, done)
 
     def _keep(self, anew: bool) -> None:
-        """Make the photograph that is shown the target, or one of its photographs."""
+        """Make the shown photograph the target, or one of the target's photographs."""
         if self._shown is None:
             raise CommandError("read a photograph first; its angle of repose becomes the target")
         read, folder, study = self._shown, self._target.folder, self._study
@@ -187,7 +187,7 @@ class PhotographPanel(Panel):
 
 
 def ruler_words(ruler: Ruler) -> str:
-    """What tells lengths on a photograph, in a sentence."""
+    """What gives the scale of a photograph, in a sentence."""
     if ruler.reference_mm is not None:
         return f"An example: its bar is {ruler.reference_mm:g} mm long, as entered below."
     if ruler.scale_mm is not None:
@@ -196,7 +196,7 @@ def ruler_words(ruler: Ruler) -> str:
 
 
 def marks_words(marks: Marks) -> str:
-    """What a person marked, in a sentence."""
+    """What the user marked, in a sentence."""
     said = []
     if marks.base_line is not None:
         left, right = marks.base_line

@@ -1,4 +1,4 @@
-"""Bench tests of one body on the solver, with the parameters on the screen: what comes out beside what is put in."""
+"""Bench tests of one body on the solver, with the parameters on the screen: results beside inputs."""
 
 from __future__ import annotations
 
@@ -45,17 +45,17 @@ class RigPanel(Panel):
                 post(lambda: self._offer(page.session.status().scene))
 
     def show(self, now: Now) -> None:
-        """Offer the bodies of what is being poured."""
+        """Offer the bodies of the present pour."""
         scene = now.status.scene
         if self._declared["rig.body"].choices != tuple(body.name for body in scene.bodies):
             self._offer(scene)
 
     def set_dark(self, dark: bool) -> None:
-        """Charts for a dark page, or a light one."""
+        """Draw the charts for a dark or a light page."""
         self.view.set_dark(dark)
 
     def _offer(self, scene: Scene) -> None:
-        """Boxes and lists for the parameters of the chosen rig, in place of those of the one before."""
+        """Boxes and lists for the parameters of the chosen rig, in place of those of the previous rig."""
         for one in self._inputs.values():
             one.remove()
         bench = with_rig(scene, self._chosen())

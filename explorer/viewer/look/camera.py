@@ -1,4 +1,4 @@
-"""Where the camera of a browser stands: presets with their keys, a link that leads back to a view, following a body."""
+"""The camera of a browser: presets with their keys, a link that restores a view, following a body."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ DIRECTIONS: Mapping[str, tuple[float, float, float]] = {
     "Whole": VIEW_DIRECTION,
     "Front": (0.0, -1.0, 0.0),
     "Side": (1.0, 0.0, 0.0),
-    # Not quite from above: straight down, the camera would not know which way is up.
+    # Not quite from above: looking straight down, the camera would have no upward direction.
     "Top": (0.0, -1e-3, 1.0),
 }
-"""From the pile to the camera."""
+"""Directions from the pile to the camera."""
 STILL = 1e-5
 """A body that has moved by less than this [m] does not move the camera."""
 LINK = "Link to this view"
 FRAME_PILE, FRAME_KEY = "Frame the pile", "5"
 FRAMED = 0.9
-"""Share of the picture that the pile takes, across or upright."""
+"""Share of the picture that the pile fills, in width or height."""
 BODY_REACH = 0.01
-"""A body reaches as far as this from its centre [m], for a picture of the pile."""
+"""Assumed reach of a body from its centre [m], for a picture of the pile."""
 VIEW_KEYS: dict[str, Any] = dict(zip(DIRECTIONS, ("1", "2", "3", "4"), strict=True))
 
 
@@ -46,10 +46,10 @@ class CameraPanel:
     Args:
         server: the page.
         post: where actions go.
-        height: tells how high it is what has to be in the picture [m].
-        pile: tells where the bodies of the pile are [m], shape (n, 3).
-        leaves: is told of a browser whose camera goes to a preset.
-        pour: tells the pour and its moment, as what stands behind # in an address; "" where there is none.
+        height: returns the height of what has to be in the picture [m].
+        pile: returns the positions of the bodies of the pile [m], shape (n, 3).
+        leaves: is called with a browser whose camera goes to a preset.
+        pour: returns the pour and its moment, as the text after # in an address; "" if there is none.
     """
 
     def __init__(
@@ -120,16 +120,16 @@ def view_of(height: float, name: str) -> CameraView:
 
 
 def aspect_of(camera: Any) -> float:
-    """Width of a browser's picture over its height; 1 where the browser has not told it yet."""
+    """Width of a browser's picture over its height; 1 if the browser has not sent it yet."""
     return camera.image_width / max(camera.image_height, 1) or 1.0
 
 
 def framing(points: Array, direction: Array, field: float, aspect: float) -> CameraView:
-    """From ``direction`` (pile to camera), so near that ``points`` (n, 3) with a body around each are just in sight.
+    """The view from ``direction`` (pile to camera), so near that ``points`` (n, 3), each with a body, just fit in.
 
     Args:
         points: [m].
-        direction: of any length; straight from above or below it is tilted a little, to know which way is up.
+        direction: of any length; if straight from above or below, it is tilted a little to define the upward direction.
         field: vertical field of view [rad].
         aspect: width of the picture over its height.
     """
@@ -146,7 +146,7 @@ def framing(points: Array, direction: Array, field: float, aspect: float) -> Cam
 
 
 def pile_points(frame: Frame | None, outlet: float) -> Array:
-    """Where the bodies of ``frame`` are that have left the rig, below its ``outlet`` [m]; where none have, all."""
+    """Positions of the bodies of ``frame`` that have left the rig, below its ``outlet`` [m]; if none have, of all."""
     if frame is None:
         return np.zeros((0, 3))
     points = frame.position[frame.inside].astype(np.float64)
@@ -172,7 +172,7 @@ def go_along(clients: Iterable[Any], target: Array) -> None:
 def go_to_place(client: Any, view: CameraView) -> None:
     """Put the camera of a browser to ``view`` and leave its field of view alone."""
     with client.atomic():
-        # In this order: a new position takes the point that is looked at along.
+        # In this order: setting the position also moves the point that is looked at.
         client.camera.position = view.position
         client.camera.look_at = view.look_at
 

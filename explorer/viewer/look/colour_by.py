@@ -1,4 +1,4 @@
-"""Colours of bodies by what they do: quantities, their range, the bar that explains them, and the controls of it."""
+"""Colours of bodies by what they do: quantities, their range, the bar that explains them, and their controls."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from explorer.viewer.palette import SELECTED, STILL, VIRIDIS, css, linear, linea
 Array = npt.NDArray[np.float64]
 
 LOW_PERCENTILE, TOP_PERCENTILE = 2.0, 98.0
-"""An automatic range reaches from here to there: a single fast body must not make all others look the same."""
+"""Ends of an automatic range: a single fast body must not make all others look the same."""
 
 MOST_DECADES = 4.0
-"""A logarithmic range spans no more than this by itself."""
+"""An automatic logarithmic range spans no more than this."""
 
 MOST_WRITTEN = 3
 """Significant digits of a number beside a bar."""
@@ -35,7 +35,7 @@ RESET = "Reset the range"
 COLOUR_KEY, NEXT_COLOUR = "C", "Colour by the next quantity"
 
 LARGEST = 1e6
-"""Largest end of a fixed range of colours, in the unit of the screen."""
+"""Largest end of a fixed range of colours, in the displayed unit."""
 
 STEP = 1e-3
 """Step of these ends; viser rounds what a box shows to this, and by itself to whole numbers."""
@@ -46,35 +46,35 @@ class Numbered(Protocol):
 
     @property
     def number(self) -> int:
-        """Another number: another moment."""
+        """Number of the moment; a different number means a different moment."""
 
 
 @dataclass(frozen=True)
 class ColourQuantity:
-    """Something that bodies can be coloured by."""
+    """A quantity by which bodies can be coloured."""
 
     unit: str
     """On the screen."""
     per_si: float
     """Numbers on the screen per number in SI."""
     read: Callable[[Any], npt.NDArray[Any]]
-    """One number in SI per body, out of what is known of them at a moment."""
+    """Gives one number in SI per body, from what is known of them at a moment."""
     meaning: str = ""
-    """In a few words, where the name does not say it all."""
+    """Explanation in a few words, if the name is not enough."""
     least: float = 0.0
-    """An automatic range is at least this wide, in the unit of the screen: noise is not to have all colours."""
+    """Least width of an automatic range, in the displayed unit: noise is not to span all colours."""
     still: float = -math.inf
-    """Bodies below this, in the unit of the screen, are grey."""
+    """Bodies below this, in the displayed unit, are grey."""
     still_words: str = ""
-    """What these are."""
+    """What the grey bodies are."""
 
     def shown(self, details: Numbered) -> Array:
-        """One number per body in the unit of the screen, shape (n,)."""
+        """One number per body in the displayed unit, shape (n,)."""
         return self.per_si * np.asarray(self.read(details), dtype=np.float64)
 
 
 STILL_SPEED, STILL_WORDS = 1e-3, "at rest: below 1 mm/s"
-"""Speed [m/s] below which a body is grey, and what the key says of it."""
+"""Speed [m/s] below which a body is grey, and what the key says about it."""
 
 
 def _speed(details: Details) -> npt.NDArray[Any]:
@@ -99,9 +99,9 @@ QUANTITIES: Mapping[str, ColourQuantity] = {
 
 
 def colour_range(look: Look, quantity: ColourQuantity, values: Array) -> tuple[float, float]:
-    """Ends of the colours in the unit of the screen: fixed, or percentiles of ``values``, rounded outward.
+    """Ends of the colours in the displayed unit: fixed, or percentiles of ``values``, rounded outward.
 
-    Those that are grey do not count. A logarithmic range begins above 0: where its lower end is not, it is
+    Values of grey bodies do not count. A logarithmic range begins above 0: if its lower end would not, it is
     ``MOST_DECADES`` below the upper one.
     """
     low, high = (look.low, look.high) if not look.automatic else _percentiles(look, quantity, values)
@@ -129,7 +129,7 @@ def _percentiles(look: Look, quantity: ColourQuantity, values: Array) -> tuple[f
 def _rounded(number: float, span: float, way: Callable[[float], int]) -> float:
     """``number`` up or down (``way``) to a digit that is a tenth to a hundredth of ``span``."""
     digit = math.floor(math.log10(span)) - 1
-    # A hair: what is round already stays.
+    # A small tolerance: numbers that are already round stay.
     hair = 1e-9 if way is math.floor else -1e-9
     return round(way(number / 10.0**digit + hair) * 10.0**digit, max(0, -digit))
 
@@ -149,7 +149,7 @@ def nice_top(values: Array) -> float:
     if top <= 0.0:
         return 1.0
     decade = 10.0 ** math.floor(math.log10(top))
-    # A hair: 0.5 / 0.1 must not count as more than 5.
+    # A small tolerance: 0.5 / 0.1 must not count as more than 5.
     return next(nice * decade for nice in NICE if top <= nice * decade * (1.0 + 1e-9))
 
 
@@ -163,9 +163,9 @@ def body_colours(
     """Colours of the n bodies of a frame for batched meshes, shape (n, 3).
 
     Args:
-        plain: those of their components, shape (n, 3).
+        plain: colours of their components, shape (n, 3).
         look: the range of the colours.
-        quantity: what the colours tell; None: the component.
+        quantity: what the colours show; None: the component.
         details: what is known of the first bodies; those that entered later, and those without a number, stay plain.
         selected: the body under inspection, if any.
     """
@@ -188,9 +188,9 @@ class ColourKey:
     """The quantity with its unit."""
     meaning: str
     numbers: tuple[float, float, float]
-    """At the lower end of the colours, in their middle, and at the upper end."""
+    """Numbers at the lower end, middle and upper end of the colours."""
     still: str
-    """What grey bodies are; empty where there can be none."""
+    """What grey bodies are; empty if there can be none."""
 
 
 def colour_key(look: Look, quantity: ColourQuantity, details: Numbered | None) -> ColourKey:
@@ -203,7 +203,7 @@ def colour_key(look: Look, quantity: ColourQuantity, details: Numbered | None) -
 
 
 def bar_html(look: Look, quantity: ColourQuantity | None, details: Numbered | None) -> str:
-    """The bar below the choice of colours: the map, its ends and middle, the quantity with its unit, what is grey."""
+    """The bar below the choice of colours: the map, its ends and middle, the quantity with its unit, grey bodies."""
     if quantity is None:
         return ""
     key, stops = colour_key(look, quantity, details), ", ".join(css(colour) for colour in VIRIDIS)
@@ -229,9 +229,9 @@ def written(number: float) -> str:
 
 
 class ColourPanel:
-    """Changes ``settings``; ``bar`` is where the colours are explained, ``quantities`` what there is to choose from.
+    """Changes ``settings``; ``bar`` is where the colours are explained, ``quantities`` are the choices.
 
-    ``note`` says more to the person who chooses.
+    ``note`` gives the user more information.
     """
 
     def __init__(
@@ -267,7 +267,7 @@ class ColourPanel:
         settings.bind(
             self._automatic,
             lambda look: look.automatic,
-            # Ends that were refused stand in the boxes still; an automatic range asks for none.
+            # Refused ends are still in the boxes; an automatic range needs none.
             lambda sent: {"automatic": True} if sent is True else {**self._ends(), "automatic": False},
         )
         settings.bind(self._logarithmic, lambda look: look.logarithmic, lambda sent: {"logarithmic": sent is True})
@@ -278,7 +278,7 @@ class ColourPanel:
 
     @property
     def quantity(self) -> ColourQuantity | None:
-        """What the colours tell; None: the component."""
+        """What the colours show; None: the component."""
         return self._quantities.get(self._settings.look.colour_by)
 
     def show(self, details: Numbered | None, more: str = "") -> None:
@@ -291,7 +291,7 @@ class ColourPanel:
         if self._bar.content != bar:
             self._bar.content, self._bar.visible = bar, bool(bar)
         if look.automatic and quantity is not None and details is not None:
-            # The boxes follow, so that a person who fixes the range begins with the one that is on the screen.
+            # The boxes follow, so that fixing the range begins with the one on the screen.
             boxes: tuple[Any, ...] = (self._low, self._high)
             for box, end in zip(boxes, colour_range(look, quantity, quantity.shown(details)), strict=True):
                 if box.value != end:
@@ -302,5 +302,5 @@ class ColourPanel:
         return {"low": low, "high": high}
 
     def _fixed(self, **end: float) -> dict[str, Any]:
-        """One end was entered: from now on the range is fixed, at what both boxes say."""
+        """One end was entered: from now on the range is fixed to the values in both boxes."""
         return {"automatic": False, **self._ends(), **end}

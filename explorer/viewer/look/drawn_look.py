@@ -1,4 +1,4 @@
-"""From settings to nodes: frames are drawn as a person wants them, and what has not changed is left alone."""
+"""From settings to nodes: frames are drawn as the user wants them, and what has not changed is left alone."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ class DrawnNodes(Protocol):
     bodies: BodyNodes
 
     def show(self, frame: Frame, seen: npt.NDArray[np.bool_] | None = None) -> None:
-        """Move everything to where ``frame`` has it."""
+        """Move everything to its place in ``frame``."""
 
     def fade(self, opacity: float) -> None:
-        """Opacity of the surfaces that one has to look through."""
+        """Set the opacity of the surfaces that one has to look through."""
 
 
 class DrawnLook:
@@ -41,7 +41,7 @@ class DrawnLook:
         self._shadows = True
 
     def move(self, nodes: DrawnNodes, frame: Frame, look: Look, seen: npt.NDArray[np.bool_]) -> bool:
-        """Draw the bodies that are ``seen``, shape (n,), where ``frame`` has them; True if anything was to do."""
+        """Draw the bodies that are ``seen``, shape (n,), where ``frame`` has them; True if anything had to be done."""
         moved = (id(nodes), frame.number, look.cut_away, look.cut_at)
         if moved == self._moved_for:
             return False
@@ -58,7 +58,7 @@ class DrawnLook:
         details: Numbered | None,
         selected: int | None = None,
     ) -> None:
-        """Colours as in :func:`body_colours`, opacities and shadows."""
+        """Set colours as in :func:`body_colours`, opacities and shadows."""
         values = details.number if details is not None and quantity is not None else 0
         colours = (look.colour_by, look.automatic, look.logarithmic, look.low, look.high)
         painted = (id(nodes), frame.generation, len(frame.component), colours, values, selected)

@@ -1,4 +1,4 @@
-"""Force chains: lines from centre to centre through the contacts that press hardest, and their controls."""
+"""Force chains: lines from centre to centre through the contacts with the largest forces, and their controls."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ MN = 1e3
 """Millinewtons per newton."""
 
 THICKEST, THINNEST = 1.6e-3, 2e-4
-"""Radius [m] of the line of a contact at the upper end of the key, and at least."""
+"""Radius [m] of the line of a contact at the upper end of the key, and the smallest radius."""
 LEAST_SHARE = 1e-9
-"""Contacts that do not press at all are no part of a chain, even with a threshold of 0 (share of the mean force)."""
+"""Contacts without pressure do not belong to a chain, even with a threshold of 0 (share of the mean force)."""
 CHAINS_KEY, FORCE_CHAINS = "K", "Force chains"
 MOST_TIMES_MEAN = 5.0
 """Largest threshold that can be chosen, in mean forces."""
 
 
 class ForceChains:
-    """Tubes, as thick as the contacts press."""
+    """Tubes whose thickness shows the contact force."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._tubes = Tubes(server, "/forces", CORE)
@@ -72,8 +72,8 @@ def chain_radii(force: Array, details: Details, threshold: float) -> Array:
 
 
 def strongest_drawn(details: Details, threshold: float) -> float:
-    """Upper end of the key [N]: a round number near the largest forces, and above the weakest one that is drawn."""
-    # One body that is jammed may press a hundred times as hard as the pile does: percentiles do not follow it.
+    """Upper end of the key [N]: a round number near the largest forces, and above the weakest drawn."""
+    # A jammed body may press a hundred times as hard as the pile; percentiles do not follow it.
     top = nice_top(np.abs(details.normal_force).astype(np.float64))
     return max(top, nice_top(np.array([2.0 * weakest(details, threshold)])))
 
@@ -110,7 +110,7 @@ def chain_key(details: Details | None, look: Look) -> str:
 
 
 class ForcePanel:
-    """Changes ``settings``, and says what the lines mean."""
+    """Changes ``settings`` and says what the lines mean."""
 
     def __init__(self, server: viser.ViserServer, settings: LookSettings, post: Post) -> None:
         self._settings, gui = settings, server.gui

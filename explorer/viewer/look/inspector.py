@@ -1,8 +1,8 @@
-"""One body under inspection: which one a click meets, and what it is, where it is, what it touches and how hard.
+"""One body under inspection: which one a click hits, what and where it is, what it touches and with which force.
 
-viser can tell the instance of a mesh that was clicked, but draws a hull of ten pixels around whatever the mouse is
-over, which hides small bodies, and says nothing of clicks beside them. So the ray of the click is followed here,
-against the surfaces as they are drawn.
+viser can report which instance of a mesh was clicked, but it draws a hull of ten pixels around whatever the mouse is
+over, which hides small bodies, and does not report clicks beside them. So the ray of the click is intersected here
+with the surfaces as they are drawn.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ STYLE = """<style>
 
 
 def body_html(scene: Scene, frame: Frame, details: Details | None, body: int | None) -> str:
-    """The whole panel; ``body`` by its order of entry, None for nobody."""
+    """The whole panel; ``body`` by its order of entry, None for none."""
     if body is None:
         return f"{STYLE}<div class='body dim'>{NOBODY}</div>"
     lines = "".join(
@@ -46,7 +46,7 @@ def body_html(scene: Scene, frame: Frame, details: Details | None, body: int | N
 
 
 def readings(scene: Scene, frame: Frame, details: Details | None, body: int) -> list[tuple[str, str]]:
-    """Names and texts of what is known of ``body``; texts are HTML."""
+    """Names and texts of what is known about ``body``; texts are HTML."""
     found = [
         ("Kind", f"{name_of(scene, frame, body)} of {len(frame.component)}"),
         ("Position", f"{vector(1e3 * frame.position[body], '.1f')} mm"),
@@ -67,7 +67,7 @@ def readings(scene: Scene, frame: Frame, details: Details | None, body: int) -> 
 
 
 def force(newtons: float) -> str:
-    """In mN, from a newton on in N."""
+    """A force in mN, from one newton in N."""
     return f"{newtons:.3g} N" if abs(newtons) >= 1.0 else f"{1e3 * newtons:.3g} mN"
 
 
@@ -111,14 +111,14 @@ def vector(numbers: npt.NDArray[np.floating], form: str) -> str:
 def nearest_hit(
     meshes: Sequence[Triangles], frame: Frame, seen: npt.NDArray[np.bool_], origin: Array, direction: Array
 ) -> int | None:
-    """Body of ``frame`` that a ray meets first, by its order of entry; None where it meets none in sight.
+    """Body of ``frame`` that a ray hits first, by its order of entry; None if it hits none in sight.
 
     Args:
         meshes: surface of a body of each component.
         frame: where the bodies are.
         seen: which of them are drawn, shape (n,).
-        origin: where the ray begins [m], shape (3,).
-        direction: where it goes, of any length, shape (3,).
+        origin: origin of the ray [m], shape (3,).
+        direction: its direction, of any length, shape (3,).
     """
     length = float(np.linalg.norm(direction))
     if not (np.isfinite(origin).all() and np.isfinite(length) and length > 0.0):
@@ -127,7 +127,7 @@ def nearest_hit(
     best, nearest = None, np.inf
     for b in _in_the_way(meshes, frame, seen, origin, direction):
         turn, size = rotation_matrix(frame.quaternion[b].astype(float)), float(frame.scale[b])
-        # In the frame of the mesh the same distance along the ray, for a direction that is scaled as well.
+        # In the frame of the mesh, the distance along the ray is the same, because the direction is scaled too.
         start = (origin - frame.position[b]) @ turn / size
         mesh = meshes[int(frame.component[b])]
         distance = first_crossing(mesh.vertices[mesh.faces].astype(float), start, direction @ turn / size)

@@ -1,4 +1,4 @@
-"""How a person wants to see the pour: settings, and which bodies they leave in sight."""
+"""How the user wants to see the pour: settings, and which bodies they leave in sight."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from explorer.live.frames import Frame
 from explorer.viewer.scene_nodes import CLEAR
 
 COMPONENT = "component"
-"""Colour by what a body is."""
+"""Colour by component."""
 NOTHING = "nothing"
 CUTS: Mapping[str, tuple[int, float]] = {
     f"{axis} {word}": (k, side)
     for k, axis in enumerate(("x", "y", "z"))
     for word, side in (("below", -1.0), ("above", 1.0))
 }
-"""What can be cut away: axis, and on which side of the place."""
+"""What can be cut away: axis, and the side of the cut."""
 
 
 @dataclass(frozen=True)
@@ -28,18 +28,18 @@ class Look:
 
     colour_by: str = COMPONENT
     automatic: bool = True
-    """The range of the colours follows the values."""
+    """Whether the range of the colours follows the values."""
     logarithmic: bool = False
-    """Colours go with the logarithm of a value."""
+    """Whether colours follow the logarithm of a value."""
     low: float = 0.0
-    """Lower end of a fixed range of the colours, in the unit of the screen."""
+    """Lower end of a fixed range of the colours, in the displayed unit."""
     high: float = 1.0
     chains: bool = False
     threshold: float = 1.0
     """Weakest contact that is drawn, as a multiple of the mean normal force."""
     cut_away: str = NOTHING
     cut_at: float = 0.0
-    """Place of the cut on its axis [m]."""
+    """Position of the cut on its axis [m]."""
     rig_opacity: float = CLEAR
     shadows: bool = True
 

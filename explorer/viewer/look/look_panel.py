@@ -1,4 +1,4 @@
-"""The tab "Look": how the pour is drawn, where the camera stands, and one body under inspection."""
+"""The tab "Look": how the pour is drawn, the camera, and one body under inspection."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ AFTER_KEY: Any = "N"
 
 
 class LookPanel(Panel):
-    """Draws the newest frame as the person wants to see it, and holds all that is set of that."""
+    """Draws the newest frame as the user wants to see it, and holds the settings for that."""
 
     name, tab = "look", LOOK
 
@@ -87,7 +87,7 @@ class LookPanel(Panel):
             post(lambda: self.click(np.array(origin, dtype=float), np.array(direction, dtype=float)))
 
     def draw(self, now: Now) -> None:
-        """Draw the newest frame; of a new pour nothing before there is one."""
+        """Draw the newest frame; of a new pour, nothing until there is one."""
         generation, self._status = self._status.generation, now.status
         if now.status.generation != generation:
             self._clear(now.status.scene)
@@ -99,7 +99,7 @@ class LookPanel(Panel):
                 self._nodes.show_gate(now.status.gate_shut)
 
     def _clear(self, scene: Scene) -> None:
-        """Another pour: no bodies yet, and another rig where it has one."""
+        """Another pour: no bodies yet, and another rig if it has one."""
         if another_set_up(scene, self._scene):
             self._nodes.remove()
             self._nodes, self._scene, self._drawn = SceneNodes(self._server, scene), scene, None
@@ -144,7 +144,7 @@ class LookPanel(Panel):
         self._text.content = body_html(self._status.scene, frame, details, self._selected)
 
     def click(self, origin: Any, direction: Any) -> None:
-        """A click into the scene: its ray [m] meets a body, which is inspected from now on, or none."""
+        """A click into the scene: its ray [m] hits a body, which is inspected from now on, or none."""
         if self._drawn is None:
             return
         seen = in_sight(self._drawn, self._settings.look)
@@ -173,7 +173,7 @@ class LookPanel(Panel):
         self._followers.clear()
 
     def _follow(self, client: Any) -> None:
-        """Let the camera of ``client`` go along with the body, or no longer."""
+        """Let the camera of ``client`` follow the body, or stop following it."""
         if self._selected is None:
             raise InputError("click a body first: there is none to follow")
         self._followers ^= {client.client_id}
@@ -191,5 +191,5 @@ class LookPanel(Panel):
         return pile_points(self._drawn, outlet_height(self._scene.rig))
 
     def _stay(self, client: Any) -> None:
-        """The camera of ``client`` goes along with no body any longer."""
+        """The camera of ``client`` no longer follows a body."""
         self._followers.discard(client.client_id)

@@ -1,6 +1,6 @@
-"""The settings of how things are drawn: handles on the page show a :class:`Look`, and change it.
+"""The settings of how things are drawn: handles on the page show a :class:`Look` and change it.
 
-Those of what one looks past stand here as well: bodies that are cut away, a rig that is seen through, shadows.
+Settings for what is in the way are here too: bodies that are cut away, a transparent rig, shadows.
 """
 
 from __future__ import annotations
@@ -16,28 +16,28 @@ from explorer.viewer.actions import Post, add_keys
 from explorer.viewer.look.look import CUTS, NOTHING, Look
 
 Take = Callable[[object], Mapping[str, Any]]
-"""From what a browser sent to settings of :class:`Look`; raises InputError for what may not be sent."""
+"""Turns what a browser sent into settings of :class:`Look`; raises InputError if it is not allowed."""
 
 CUT_KEY, NEXT_CUT = "X", "Cut away the next side"
 CUT_CHOICES = (NOTHING, *CUTS)
 REACH_MM = 200.0
-"""The cut can be moved as far as this from the axis and above the plate [mm]."""
+"""Largest distance of the cut from the axis and above the plate [mm]."""
 
 
 class LookSettings:
-    """Holds the settings; what they do is up to who reads :attr:`look`."""
+    """Holds the settings; readers of :attr:`look` apply them."""
 
     def __init__(self, post: Post) -> None:
         self.look, self._post = Look(), post
         self._shown: list[tuple[Any, Callable[[Look], Any]]] = []
 
     def bind(self, handle: Any, shown: Callable[[Look], Any], take: Take) -> None:
-        """Let ``handle`` always show ``shown`` of the look, and take over what a person enters there."""
+        """Let ``handle`` always show ``shown`` of the look, and apply what the user enters there."""
         self._shown.append((handle, shown))
         self.listen(handle, take)
 
     def listen(self, handle: Any, take: Take) -> None:
-        """Take over what a person enters at ``handle``, and not what this program writes there."""
+        """Apply what the user enters at ``handle``, but not what this program writes there."""
 
         def entered(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is not None:
@@ -47,7 +47,7 @@ class LookSettings:
         handle.on_update(entered)
 
     def change(self, **settings: Any) -> None:
-        """Take over settings of :class:`Look` and show them; raises InputError for a range that is none."""
+        """Apply settings of :class:`Look` and show them; raises InputError for an invalid range."""
         look = replace(self.look, **settings)
         if look.high <= look.low:
             raise InputError(f"colour range: its end {look.high:g} is not above its beginning {look.low:g}")
@@ -57,13 +57,13 @@ class LookSettings:
                 handle.value = shown(look)
 
     def next(self, setting: str, choices: tuple[str, ...]) -> None:
-        """Change ``setting`` to the choice that comes after the present one, around."""
+        """Change ``setting`` to the next choice, cyclically."""
         following = (choices.index(getattr(self.look, setting)) + 1) % len(choices)
         self.change(**{setting: choices[following]})
 
 
 def one_of(value: object, choices: tuple[str, ...], name: str) -> str:
-    """A choice that came from a browser; raises InputError if it is none."""
+    """A choice from a browser; raises InputError if it is not one of ``choices``."""
     for choice in choices:
         if value == choice:
             return choice

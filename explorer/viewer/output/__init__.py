@@ -1,1 +1,1 @@
-"""The tab of what is taken along: the command line, files, recordings."""
+"""The tab for exports: the command line, files, recordings."""

@@ -1,4 +1,4 @@
-"""The pour for another program: what `explorer export` writes, in one file that a browser takes along."""
+"""The pour for another program: what `explorer export` writes, in one file for download."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class EngineExport(Panel):
 
 
 def programs_text() -> str:
-    """What each program gets; of plug-ins, which are not loaded for it, where they come from."""
+    """What each program gets; for plug-ins, which are not loaded for this, where they come from."""
     own = groupby(OWN, key=lambda target: target.what)
     lines = [f"{', '.join(target.name for target in alike)}: {what}." for what, alike in own]
     return " ".join([*lines, *(f"{name}: of {origin('export', name)}." for name in names()[len(OWN) :])])
@@ -61,7 +61,7 @@ def programs_text() -> str:
 def packed_export(scene: Path, program: str, seed: int) -> bytes:
     """A .zip of the folder that ``explorer export scene DIR --to program`` makes, in a process of its own.
 
-    ``seed`` is that of the pour, for programs that get one. Raises CommandError where that command refuses.
+    ``seed`` is that of the pour, for programs that take one. Raises CommandError if that command refuses.
     """
     with tempfile.TemporaryDirectory() as apart:
         folder = Path(apart) / f"{scene.stem}_{program}"

@@ -1,4 +1,4 @@
-"""What is taken along of what is on the screen: the command line that repeats it, files, pictures."""
+"""Exports of what is on the screen: the command line that repeats it, files, pictures."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class OutputPanel(Panel):
         self._picture = PicturePanel(gui, page.post, page.background, self._picture_name, self._legend)
 
     def show(self, now: Now) -> None:
-        """The command line of what is on the screen."""
+        """Show the command line of what is on the screen."""
         present = (self._session.source, now.status.scene, now.status.seed)
         if self._compared is None or present != self._compared:
             self._compared = present
@@ -103,13 +103,13 @@ class OutputPanel(Panel):
 
 
 def command_html(source: SceneSource, scene: Scene, seed: int) -> str:
-    """The command line in a box that one click selects as a whole; in words where there is none."""
+    """The command line in a box that one click selects as a whole; in words if there is none."""
     try:
         line, select = command_line(source, scene, seed), "all"
     except CommandError as error:
         line, select = f"None: {error}", "auto"
     style = f"display:block; user-select:{select}; white-space:pre-wrap; padding:0.4em; margin-bottom:0.6em"
-    # Each option keeps its value, and no line breaks at a hyphen inside one.
+    # Each option stays with its value, and no line breaks at a hyphen inside an option.
     whole = "<span style='display:inline-block; max-width:100%'>{}</span>"
     words = " ".join(whole.format(escape(part)) for part in re.split(r" (?=--)", line))
     return small_html(f"<code style='{style}; background:rgba(128,150,170,0.14)'>{words}</code>")

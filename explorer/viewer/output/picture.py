@@ -1,4 +1,4 @@
-"""A picture of the scene for a paper: at a multiple of the screen's size, with a scale bar and a key drawn onto it."""
+"""A picture of the scene for a paper: at a multiple of the screen's size, with a scale bar and a key."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from explorer.viewer.output.send_file import send_file
 from explorer.viewer.palette import CORE, HALO, STILL, Colour, mapped
 
 LARGEST_PICTURE = (4320, 7680)
-"""Height and width [pixels]."""
+"""Largest height and width [pixels]."""
 RENDER_WAIT = 60.0
 """Seconds that a browser has to draw a picture."""
 SIZES: Mapping[str, int] = {"1×": 1, "2×": 2, "4×": 4}
-"""Multiples of what a browser shows."""
+"""Multiples of the size that a browser shows."""
 DARK_GROUND, WHITE_GROUND, NO_GROUND = "dark", "white", "transparent"
 GROUNDS: Mapping[str, tuple[int, int, int, int]] = {
     DARK_GROUND: (20, 20, 20, 255),
@@ -38,7 +38,7 @@ INK: Mapping[str, tuple[Colour, Colour]] = {
     WHITE_GROUND: (HALO, CORE),
     NO_GROUND: (HALO, CORE),
 }
-"""What is written with on each, and its rim: the plate, which is dark, may be behind it."""
+"""Colour of text on each background, and of its rim: the plate, which is dark, may be behind it."""
 TEXT = 15
 """Height of letters [pixels at 1×]; other lengths are multiples of it."""
 BAR_SHARE = 0.25
@@ -48,18 +48,18 @@ NICE = (5.0, 2.0, 1.0)
 
 @dataclass(frozen=True)
 class Legend:
-    """What is told beside a picture."""
+    """What is explained in a picture."""
 
     components: Sequence[tuple[str, Colour]] = ()
-    """Name and colour of each, where colours are of the component."""
+    """Name and colour of each component, if bodies are coloured by component."""
     colours: ColourKey | None = None
-    """The key, where colours are of a quantity."""
+    """The key, if bodies are coloured by a quantity."""
     strongest: float | None = None
-    """Force [mN] of the thickest lines, where force chains are drawn."""
+    """Force [mN] of the thickest lines, if force chains are drawn."""
 
 
 def rendered(client: Any, scale: int) -> npt.NDArray[np.uint8]:
-    """The scene as ``client`` sees it, ``scale`` times as large, as RGBA; CommandError where it is not drawn."""
+    """The scene as ``client`` sees it, ``scale`` times as large, as RGBA; raises CommandError if it is not drawn."""
     height, width = scale * client.camera.image_height, scale * client.camera.image_width
     if height < 1 or width < 1:
         raise CommandError("picture: the browser has not sent its size yet")
@@ -68,7 +68,7 @@ def rendered(client: Any, scale: int) -> npt.NDArray[np.uint8]:
         pixels: npt.NDArray[np.uint8] = client.get_render(
             round(shrink * height), round(shrink * width), transport_format="png", timeout=RENDER_WAIT
         )
-    # What is wrong with a picture, its reader says by errors of many kinds, and the picture is the browser's.
+    # The picture comes from a browser, and its reader raises errors of many kinds.
     except Exception as error:
         raise CommandError(f"picture: the browser did not draw it: {' '.join(str(error).split())[:120]}") from None
     if pixels.dtype != np.uint8 or pixels.ndim != 3 or pixels.shape[2] != 4:
@@ -77,7 +77,7 @@ def rendered(client: Any, scale: int) -> npt.NDArray[np.uint8]:
 
 
 def pixels_per_metre(camera: Any, height: int) -> float:
-    """Of a picture ``height`` pixels high, across the view as far away as the middle of the plate is."""
+    """For a picture ``height`` pixels high, across the view at the distance of the middle of the plate."""
     forward = np.asarray(camera.look_at, dtype=np.float64) - camera.position
     forward /= np.linalg.norm(forward)
     distance = float(-np.asarray(camera.position, dtype=np.float64) @ forward)
@@ -100,7 +100,7 @@ def length_words(length: float) -> str:
 
 
 def composed(pixels: npt.NDArray[np.uint8], ground: str, per_metre: float, legend: Legend, unit: float) -> bytes:
-    """``pixels`` (RGBA) before a ``ground`` with scale bar and key, as PNG; ``unit``: pixels per one of the screen."""
+    """``pixels`` (RGBA) on a ``ground``, with scale bar and key, as PNG; ``unit``: pixels per screen pixel."""
     image = Image.new("RGBA", (pixels.shape[1], pixels.shape[0]), GROUNDS[ground])
     image.alpha_composite(Image.fromarray(pixels, "RGBA"))
     sheet = Sheet(image, *INK[ground], unit * TEXT)
@@ -119,7 +119,7 @@ class Sheet:
         self._draw, self._font = ImageDraw.Draw(image), ImageFont.load_default(size)
 
     def scale_bar(self, per_metre: float) -> None:
-        """In the lower left corner."""
+        """Draw the scale bar in the lower left corner."""
         length, size = bar_length(per_metre, self._image.width), self._size
         left, foot = 1.5 * size, self._image.height - 1.5 * size
         right = left + length * per_metre
@@ -129,7 +129,7 @@ class Sheet:
         self._write((0.5 * (left + right), foot - 0.6 * size), length_words(length), "mb")
 
     def key(self, legend: Legend) -> None:
-        """In the upper right corner: components, or the colours of a quantity; thickness of lines."""
+        """Draw the key in the upper right corner: components, or the colours of a quantity; thickness of lines."""
         size = self._size
         wide = max([12.0 * size, *(self._font.getlength(name) + 2.0 * size for name, _ in legend.components)])
         left, top = self._image.width - 1.5 * size - wide, 1.5 * size
@@ -163,7 +163,7 @@ class Sheet:
         self._draw.text(place, words, self._ink, self._font, anchor, stroke_width=rim, stroke_fill=self._rim)
 
     def _numbers(self, left: float, top: float, wide: float, numbers: Sequence[float], title: str) -> float:
-        """Numbers below a bar and their title; where the next entry begins."""
+        """Draw numbers and a title below a bar; returns where the next entry begins."""
         for share, anchor, number in zip((0.0, 0.5, 1.0), ("la", "ma", "ra"), numbers, strict=True):
             self._write((left + share * wide, top), written(number), anchor)
         self._write((left, top + 1.3 * self._size), title, "la")
@@ -171,14 +171,14 @@ class Sheet:
 
 
 class PicturePanel:
-    """Size, background and button; a picture of what a browser shows is made when that presses it.
+    """Size, background and button; a click in a browser makes a picture of what that browser shows.
 
     Args:
         gui: where the controls go.
         post: where actions go.
         background: where pictures are made.
-        name: tells what the file is called.
-        legend: tells what is to be explained.
+        name: returns the name of the file.
+        legend: returns what is to be explained.
     """
 
     def __init__(
@@ -214,7 +214,7 @@ class PicturePanel:
 
 
 def picture(client: Any, scale: int, ground: str, legend: Legend) -> bytes:
-    """What ``client`` sees, ``scale`` times as large, before ``ground``, with scale bar and key, as PNG."""
+    """What ``client`` sees, ``scale`` times as large, on ``ground``, with scale bar and key, as PNG."""
     pixels = rendered(client, scale)
     unit = pixels.shape[0] / client.camera.image_height
     return composed(pixels, ground, pixels_per_metre(client.camera, pixels.shape[0]), legend, unit)

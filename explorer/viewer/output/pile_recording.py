@@ -30,7 +30,7 @@ class PileRecording:
         self, page: PageContext, order: Callable[[], tuple[Path, Sequence[str]]], program: Sequence[str] = PROGRAM
     ) -> None:
         self._folder, self._order, self._program = page.data / "recordings", order, program
-        # Of its own: it may take minutes, and nothing else of the page waits for it.
+        # A worker of its own: it may take minutes, and nothing else on the page is to wait for it.
         self._work = BackgroundWork(page.post)
         self._process: subprocess.Popen[str] | None = None
         self._cancelled = False
@@ -46,13 +46,13 @@ class PileRecording:
         self._now = ""
 
     def offer(self, able: bool) -> None:
-        """Whether there is an answer to record; what is being recorded can be cancelled without one, too."""
+        """Set whether there is an answer to record; a recording in progress can be cancelled even without one."""
         visible = able or bool(self._work.busy_with)
         if self._buttons.visible != visible:
             self._buttons.visible = visible
 
     def show(self) -> None:
-        """Say whether one is being made."""
+        """Say whether a recording is being made."""
         busy = self._work.busy_with
         offered = (CANCEL,) if busy else (RECORD,)
         if tuple(self._buttons.options) != offered:
@@ -62,12 +62,12 @@ class PileRecording:
             self._line.content, self._line.visible = said, bool(busy)
 
     def _hear(self, line: str) -> None:
-        """What the command is at, in its own words."""
+        """Take a line in which the command says what it is doing."""
         self._now = line
 
     def _begun(self, process: subprocess.Popen[str]) -> None:
         self._process = process
-        if self._cancelled:  # before the process was there
+        if self._cancelled:  # before the process existed
             process.kill()
 
     def _cancel(self, client: Any) -> None:

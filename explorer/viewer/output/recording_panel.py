@@ -1,6 +1,6 @@
-"""Recordings of the moving scene: begun, ended, taken along and replayed by a person.
+"""Recordings of the moving scene: begun, ended, downloaded and replayed by the user.
 
-A replay is a page of its own, beside the live page and in its process: no other program has to be started.
+A replay is a page of its own beside the live page and in the same process: no other program has to be started.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class RecordingPanel(Panel):
                 page.post(lambda: self._record(client, chosen))
 
     def show(self, now: Now) -> None:
-        """State of the recording, or the page's last message."""
+        """Show the state of the recording, or the page's last message."""
         running, kept = self._recording.running, self._recording.path is not None
         options = (STOP,) if running else (START, DOWNLOAD, REPLAY) if kept else (START,)
         if tuple(self._switch.options) != options:
@@ -69,7 +69,7 @@ class RecordingPanel(Panel):
             self._state.content = state
 
     def close(self) -> None:
-        """End a recording that was begun on the page, with its file whole, and the pages that replay one."""
+        """End a recording that was begun on the page, with a complete file, and the pages that replay one."""
         self._recording.close()
         self._show_replays([])
 
@@ -100,7 +100,7 @@ class RecordingPanel(Panel):
                 )
 
     def _show_replays(self, replays: list[ReplayBeside]) -> None:
-        """Of the last recording only: those before it are ended."""
+        """Show the replays of the last recording; earlier ones are closed."""
         for replay in self._replays:
             replay.close()
         self._replays = replays
@@ -109,13 +109,13 @@ class RecordingPanel(Panel):
 class ReplayBeside:
     """Serves ``recording`` on a free port of ``host`` until it is closed; plays when the first browser comes.
 
-    ``token``: that of the page which it stands beside.
+    ``token``: that of the live page.
 
-    Raises :class:`explorer.errors.CommandError` where it cannot be read.
+    Raises :class:`explorer.errors.CommandError` if the recording cannot be read.
     """
 
     def __init__(self, recording: Path, host: str, token: str | None) -> None:
-        # Imported here: rerun takes a second to load, and most sessions are not replayed.
+        # Imported here: rerun takes a second to load, and most sessions are never replayed.
         from explorer.recordings.recording_reader import read_recording
         from explorer.viewer.replay.replay_page import ReplayPage
 
@@ -131,19 +131,19 @@ class ReplayBeside:
             raise
         self.address = f"http://{address(host)}:{self._server.get_port()}"
         self.seconds = float(read.times[-1]) - read.zero
-        """How much it holds [s]."""
+        """Duration of the recording [s]."""
         self._loop = threading.Thread(target=page.run, args=(self._stop,), daemon=True, name="explorer-replay")
         self._loop.start()
 
     def close(self) -> None:
-        """End the page."""
+        """Close the page."""
         self._stop.set()
         self._loop.join()
         self._server.stop()
 
 
 def replays_beside(recordings: Sequence[Path], host: str, token: str | None) -> list[ReplayBeside]:
-    """One for each of ``recordings``; none is left open where one of them cannot be read."""
+    """One replay for each of ``recordings``; none is left open if one of them cannot be read."""
     with ExitStack() as stack:
         replays = []
         for path in recordings:

@@ -1,6 +1,6 @@
-"""Recordings that are begun and ended on the page, beside the one of the command line.
+"""Recordings that are begun and ended on the page, in addition to the one of the command line.
 
-One of rerun's is a file per pour; a web page is the scene as it moves, which any browser plays without a server.
+A rerun recording is one file per pour; a web page is the moving scene, which any browser plays without a server.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from explorer.recordings.recording import RecordedPour, RunningViewer
 from explorer.viewer.actions import BackgroundWork
 
 MOST_BYTES = 150e6
-"""Of poses that are kept, before they are packed: half an hour of 80 bodies, 20 s of as many as a frame holds."""
+"""Size of the poses kept, before packing: half an hour of 80 bodies, 20 s of as many as a frame holds."""
 BYTES_PER_BODY = 32
 LONGEST_PAUSE = 0.5
 """A pause in the pour takes no longer than this [s] in the playback."""
@@ -37,13 +37,13 @@ class RecordingState:
     kind: str = ""
     """One of ``RRD`` and ``HTML``; empty before the first recording."""
     pours: int = 0
-    """Of the present or last recording, so far."""
+    """Number of pours in the present or last recording, so far."""
     seconds: float = 0.0
-    """Wall time since it was begun; 0 where none is running."""
+    """Wall time since the recording was begun; 0 if none is running."""
 
     @property
     def words(self) -> str:
-        """``REC 1:05``, and the number of the pour from the second on; empty where none is running."""
+        """``REC 1:05``, and from the second pour on its number; empty if none is running."""
         if not self.running:
             return ""
         minutes, seconds = divmod(int(self.seconds), 60)
@@ -51,7 +51,7 @@ class RecordingState:
 
 
 class Recorder(Protocol):
-    """Something that keeps what the page shows, a file per pour."""
+    """Something that keeps what the page shows, in one file per pour."""
 
     @property
     def pours(self) -> tuple[RecordedPour, ...]:
@@ -61,19 +61,19 @@ class Recorder(Protocol):
         """Called about 30 times a second with the newest frame and the newest status."""
 
     def close(self) -> None:
-        """End the recording; its files are then whole."""
+        """End the recording; its files are then complete."""
 
 
 def session_recorder(to: Path | RunningViewer) -> Recorder:
-    """A recording of rerun's into the new file ``to``, or into a viewer that is open."""
-    # Imported here: rerun takes a second to load, and most sessions are not recorded.
+    """A rerun recording into the new file ``to``, or into an open viewer."""
+    # Imported here: rerun takes a second to load, and most sessions are never recorded.
     from explorer.recordings.session_recorder import SessionRecorder
 
     return SessionRecorder(to)
 
 
 class RecordingSwitch:
-    """A recording at a time, into ``folder``; ``open_rrd`` begins one of rerun's."""
+    """One recording at a time, into ``folder``; ``open_rrd`` begins a rerun recording."""
 
     def __init__(
         self,
@@ -90,7 +90,7 @@ class RecordingSwitch:
 
     @property
     def state(self) -> RecordingState:
-        """What is being recorded, for whoever tells it on the page."""
+        """What is being recorded, for display on the page."""
         kind = "" if self._path is None else RRD if self._path.suffix == ".rrd" else HTML
         since = time.monotonic() - self._began if self.running else 0.0
         return RecordingState(self.running, kind, len(self.pours), since)
@@ -102,18 +102,18 @@ class RecordingSwitch:
 
     @property
     def path(self) -> Path | None:
-        """First file of the present or last recording; None before there was one."""
+        """First file of the present or last recording; None before the first."""
         return self._path
 
     @property
     def pours(self) -> tuple[RecordedPour, ...]:
-        """Files of the present or last recording of rerun's, one per pour; a web page is one file of all pours."""
+        """Files of the present or last rerun recording, one per pour; a web page is one file for all pours."""
         if self._recorder is None or isinstance(self._recorder, ScenePlayback):
             return self._pours
         return self._recorder.pours
 
     def begin(self, kind: str) -> None:
-        """Begin a recording of one of the two kinds; CommandError while one is running, or for another kind."""
+        """Begin a recording of one of the two kinds; raises CommandError while one is running, or for another kind."""
         if self.running:
             raise CommandError(f"recording: one is running, into {self._path}; stop it first")
         if kind not in (RRD, HTML):
@@ -129,16 +129,16 @@ class RecordingSwitch:
             )
 
     def end(self) -> None:
-        """End the recording; CommandError where there is none."""
+        """End the recording; raises CommandError if there is none."""
         recorder, path = self._recorder, self._path
         if recorder is None or path is None:
             raise CommandError("recording: none is running")
         if isinstance(recorder, ScenePlayback):
-            # Refused while something else is being done; the recording goes on then.
+            # Refused while another job is being done; the recording then continues.
             self._background.start("packing the recording", lambda: write_whole(path, recorder.html()), lambda _: None)
             self._recorder = None
             return
-        # In this order: whoever sees that nothing is recorded any more may open the files.
+        # In this order: whoever sees that the recording has ended may open the files.
         try:
             recorder.close()
         finally:
@@ -147,7 +147,7 @@ class RecordingSwitch:
     def take(self, frame: Frame, status: Status) -> None:
         """Hand on what the page shows, if it is being recorded; a web page that is full is ended.
 
-        So is a recording that cannot go on, which raises what is wrong.
+        A recording that cannot continue is also ended, and its error is raised.
         """
         if self._recorder is None:
             return
@@ -160,9 +160,9 @@ class RecordingSwitch:
             self.end()
 
     def files(self) -> tuple[Path, ...]:
-        """What a person takes along of the last recording: a file per pour since its beginning, or the web page.
+        """Files of the last recording for download: one per pour since its beginning, or the web page.
 
-        CommandError where there is none, or while it is being written.
+        Raises CommandError if there is none, or while it is being written.
         """
         if self.running or self._background.busy_with:
             raise CommandError("recording: stop it first, and wait until it is written")
@@ -174,7 +174,7 @@ class RecordingSwitch:
         return tuple(found)
 
     def close(self) -> None:
-        """End what is running, with its file whole."""
+        """End the running recording, with a complete file."""
         recorder, self._recorder = self._recorder, None
         if isinstance(recorder, ScenePlayback) and self._path is not None:
             write_whole(self._path, recorder.html())
@@ -187,16 +187,16 @@ class RecordingSwitch:
 
 
 class ScenePlayback:
-    """Keeps what is sent to browsers from its making on; a recorder of the page."""
+    """Keeps what is sent to browsers from its creation on; a recorder of the page."""
 
     def __init__(self, server: viser.ViserServer) -> None:
-        self._serializer: Any = server.get_scene_serializer()  # takes note of all that is sent until it is packed
+        self._serializer: Any = server.get_scene_serializer()  # records all that is sent until it is packed
         self._last = time.monotonic()
         self._number, self._bytes = -1, 0.0
         self._html: str | None = None
 
     def take(self, frame: Frame, status: Status) -> None:
-        """Note how much time has passed since the frame before, in wall time as a person saw it."""
+        """Note how much wall time has passed since the previous frame, as the user saw it."""
         if self._html is not None or frame.number == self._number:
             return
         now = time.monotonic()
@@ -206,11 +206,11 @@ class ScenePlayback:
 
     @property
     def full(self) -> bool:
-        """Whether as much is kept as one file should hold."""
+        """Whether it keeps as much as one file should hold."""
         return self._bytes > MOST_BYTES
 
     def close(self) -> None:
-        """End the playback; :meth:`html` gives it out."""
+        """End the playback; :meth:`html` returns it."""
         if self._html is None:
             self._html = self._serializer.as_html(dark_mode=True)
 

@@ -1,7 +1,7 @@
 """A second pour beside the first, in a solver process of its own, and a measured pile on the other side.
 
-All are drawn in one scene, so every camera sees all. The second pour plays and keeps speed with the first; where the
-first one stands still, the second comes to the same moment, back or on.
+All are drawn in one scene, so every camera sees all. The second pour plays and keeps pace with the first; when the
+first stands still, the second moves to the same moment, backward or forward.
 """
 
 from __future__ import annotations
@@ -35,27 +35,27 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Aside:
-    """Where a camera was put so that all piles are in its picture."""
+    """Position to which a camera was moved so that all piles are in its picture."""
 
     away: Array
-    """From pile to camera before that [m]."""
+    """Vector from pile to camera before the move [m]."""
     aspect: float
     """Width of the picture over its height."""
     position: Array
     """[m]."""
     scene: Scene
     middle: float
-    """Of all piles along x [m]."""
+    """Middle of all piles along x [m]."""
 
     def holds(self, position: Array) -> bool:
-        """Whether the camera still stands there: less a hair, browsers tell single precision."""
+        """Whether the camera is still there, within a small tolerance: browsers send single precision."""
         return bool(np.allclose(position, self.position, atol=1e-4))
 
 
 class BesidePile:
     """A second pour beside the first, drawn and kept at the first one's moment, and a measured surface beside both.
 
-    ``open_session`` makes the session that it runs in.
+    ``open_session`` makes the session in which the second pour runs.
     """
 
     def __init__(
@@ -78,9 +78,9 @@ class BesidePile:
         self.pour(status.scene, status.seed)
 
     def pour(self, scene: Scene, seed: int, names: tuple[str, str] = ("first pour", "second pour")) -> None:
-        """Begin the second pour, in place of one before it; ``names`` stand above both, with what they have come to."""
+        """Begin the second pour, in place of an earlier one; ``names`` appear above both, with their results."""
         second = self._second or self._open()
-        second.start(scene, seed)  # where that is refused, all stays as it was
+        second.start(scene, seed)  # if that is refused, everything stays as it was
         self._take_signs_away()
         if self._second is None:
             self._second = second
@@ -106,7 +106,7 @@ class BesidePile:
         self._step_aside(scene, 0.0 if surface is not None else 0.5 * BESIDE)
 
     def close(self) -> None:
-        """End the second pour and take all of it off the page."""
+        """End the second pour and remove everything of it from the page."""
         self._take_signs_away()
         self._step_back()
         if self._second is not None:
@@ -116,11 +116,11 @@ class BesidePile:
 
     @property
     def widest_plate(self) -> float:
-        """Largest radius of the first pile's plate [m], so that it does not lie over those beside it."""
+        """Largest radius of the first pile's plate [m] that does not overlap those beside it."""
         return math.inf if self._second is None else PLATE_RADIUS
 
     def draw(self) -> None:
-        """Draw its newest frame."""
+        """Draw the second pour's newest frame."""
         if self._second is None:
             return
         self._follow_windows()
@@ -135,24 +135,24 @@ class BesidePile:
             self._nodes.show_gate(status.gate_shut)
 
     def follow(self, first: Status) -> Status | None:
-        """Let time go or stand as in the first pour; the second one's status, None without one."""
+        """Let time run or stand still as in the first pour; returns the second pour's status, None without one."""
         second = None if self._second is None else self._second.status()
         moments = None if second is None else (second.state, second.time, first.state, first.time, first.speed)
         if self._second is not None and second is not None and moments != self._kept_for:
-            # Once per moment: what was asked shows in a later status only.
+            # Once per moment: the effect of the request shows only in a later status.
             self._kept_for = moments
             keep_time(self._second, second, first)
         return second
 
     def say(self, first: str, second: str) -> None:
-        """What both pours have come to, below their names."""
+        """Show the results of both pours below their names."""
         for (name, sign), said in zip(self._names.items(), (first, second), strict=False):
             text = f"{name}\n{said}"
             if sign.text != text:
                 sign.text = text
 
     def _step_aside(self, scene: Scene, middle: float) -> None:
-        """Move every camera away until all plates are in its picture; from where a person had it."""
+        """Move every camera back, from where the user had it, until all plates are in its picture."""
         self._aside, former = {}, self._aside
         for number, client in self._server.get_clients().items():
             camera, before = client.camera, former.get(number)
@@ -163,7 +163,7 @@ class BesidePile:
             self._aside[number] = Aside(away, aspect_of(camera), np.array(view.position), scene, middle)
 
     def _step_back(self) -> None:
-        """Every camera that nobody has moved since goes back to the first pile, as near as it was."""
+        """Return every camera that nobody has moved since to the first pile, at its former distance."""
         clients = self._server.get_clients()
         for number, aside in self._aside.items():
             client = clients.get(number)
@@ -173,7 +173,7 @@ class BesidePile:
         self._aside = {}
 
     def _follow_windows(self) -> None:
-        """A picture that has another shape now, of a camera that no person has moved since, holds all plates again."""
+        """Adapt cameras that nobody has moved since, so that pictures of a new shape hold all plates again."""
         clients = self._server.get_clients()
         for number, aside in self._aside.items():
             client = clients.get(number)
@@ -191,7 +191,7 @@ class BesidePile:
         return sign
 
     def _take_signs_away(self) -> None:
-        for sign in reversed(self._signs):  # what stands below another node goes with that
+        for sign in reversed(self._signs):  # nodes below another node are removed with it
             sign.remove()
         self._signs, self._names = [], {}
 
@@ -203,7 +203,7 @@ class BesidePile:
 
 
 def keep_time(session: Session, second: Status, first: Status) -> None:
-    """Play and pace ``session`` as the first pour does; bring it to the first one's moment where that stands still."""
+    """Play and pace ``session`` as the first pour does; bring it to the first one's moment when that stands still."""
     if first.state == SessionState.PAUSED:
         _come_to(session, second, first.time)
     elif second.state == SessionState.PAUSED and first.state in (SessionState.RUNNING, SessionState.ENDED):

@@ -1,7 +1,7 @@
-"""What was changed: undo and redo, the list against the default with the way back, and presets.
+"""Changes: undo and redo, the list of differences from the default with a way back, and presets.
 
-Undo and redo go along the live parameters as they were, one entry per change. The solver's word counts: an entry is
-what it has in force, whoever asked for it. What undo and redo ask for comes back as such a change too, and is
+Undo and redo step through former values of the live parameters, one entry per change. The solver decides: an entry is
+what it has in force, whoever asked for it. What undo and redo ask for also comes back as such a change, and is
 recognised by its values.
 """
 
@@ -29,11 +29,11 @@ LiveValues = Mapping[str, Any]
 MOST_ENTRIES = 200
 """Changes that can be undone."""
 MERGED = 1.0
-"""Changes of the same parameters that follow one another within this wall time [s] are one entry: a slider's drag."""
+"""Changes of the same parameters within this wall time [s] of each other are one entry: a slider being dragged."""
 UNDO, REDO, BACK, DEFAULT = "Undo (Z)", "Redo (Y)", "All back", "Pour the default"
 KEYS: dict[str, Any] = {UNDO: "Z", REDO: "Y"}
 MOST_SHOWN = 40
-"""Lines of the list against the default."""
+"""Lines of the list of differences from the default."""
 ONE = "one parameter …"
 NO_PRESET = "choose …"
 
@@ -76,7 +76,7 @@ class ChangesPanel(Panel):
         self._history.take(now.status.scene, time.monotonic())
 
     def show(self, now: Now) -> None:
-        """The list against the default."""
+        """Show the list of differences from the default."""
         default, scene = self._session.source.scene, now.status.scene
         if self._compared is None or self._compared[0] is not default or self._compared[1] != scene:
             self._compared = (default, scene)
@@ -136,7 +136,7 @@ def defaults(session: Session) -> dict[str, Any]:
 
 
 def apply_preset(session: Session, preset: Preset) -> None:
-    """Set the values of ``preset``: at once, or with a new pour where it names what acts on restart only."""
+    """Set the values of ``preset``: at once, or with a new pour if it has parameters that act on restart only."""
     present = session.status().scene
     found = preset_values(preset, present)
     known = parameters(present)
@@ -147,7 +147,7 @@ def apply_preset(session: Session, preset: Preset) -> None:
 
 
 def changes_html(found: Sequence[Difference], undoable: int, redoable: int) -> str:
-    """One line per parameter that differs, default → now; marked where it acts on restart only."""
+    """One line per parameter that differs, default → now; marked if it acts on restart only."""
     rows = "".join(
         f"<tr><td style='padding-right:1em'>{escape(one.path)}"
         f"{'' if one.live else ' <i>(on restart)</i>'}</td>"
@@ -162,7 +162,7 @@ def changes_html(found: Sequence[Difference], undoable: int, redoable: int) -> s
 
 
 def _on_choice(register: Callable[[Any], Any], act: Callable[[str], object]) -> None:
-    """Call ``act`` with what a person chose; what the program sets itself is no choice."""
+    """Call ``act`` with the user's choice; values that the program sets do not count."""
 
     def chosen(event: viser.GuiEvent[Any]) -> None:
         if event.client_id is not None:
@@ -172,7 +172,7 @@ def _on_choice(register: Callable[[Any], Any], act: Callable[[str], object]) -> 
 
 
 class ParameterHistory:
-    """Entries of one session; a scene with other live parameters begins anew."""
+    """Entries of one session; a scene with other live parameters starts over."""
 
     def __init__(self) -> None:
         self._entries: list[LiveValues] = []
@@ -204,7 +204,7 @@ class ParameterHistory:
             self._step(now, wall)
 
     def undo(self) -> LiveValues:
-        """Values to be set so that the last change is undone; raises CommandError where there is none."""
+        """Values to be set so that the last change is undone; raises CommandError if there is none."""
         if self.undoable == 0:
             raise CommandError("nothing to undo: no live parameter was changed")
         return self._towards(self._goal - 1)
@@ -221,7 +221,7 @@ class ParameterHistory:
 
     def _towards(self, goal: int) -> LiveValues:
         now, self._goal = self._entries[self._goal], goal
-        self._changed = frozenset()  # what comes next is a change of its own
+        self._changed = frozenset()  # the next change is an entry of its own
         return {path: wanted for path, wanted in self._entries[goal].items() if wanted != now[path]}
 
     def _step(self, now: LiveValues, wall: float) -> None:

@@ -1,6 +1,6 @@
 """Angle of repose with its spread over the flanks, and discharged mass, over simulated time, as they come in.
 
-Changes of parameters are marks on a chart over time. uPlot draws lines only, as viser hands it on: a mark is a spike of
+Changes of parameters are marks on a chart over time. viser's uPlot interface draws only lines, so a mark is a spike of
 one series, up and down at one moment.
 """
 
@@ -34,20 +34,20 @@ from solver.observables.observable import Value
 Array = npt.NDArray[np.float64]
 
 MOST_MARKS = 40
-"""Moments that are marked; the oldest are given up."""
+"""Moments that are marked at most; the oldest are dropped."""
 HALF_WIDTH = 1e-5
-"""Half the foot of a spike, which is a mark [s]."""
+"""Half the width of the foot of a spike [s]."""
 MOST_LETTERS = 64
-"""Of the legend of the marks."""
+"""Longest legend of the marks [characters]."""
 NO_MARKS = "no change yet"
 LEGEND_INTERVAL = 1.0
-"""Wall time [s] between two texts of a legend: with every one of them the browser makes the chart anew."""
+"""Wall time [s] between two texts of a legend: the browser rebuilds the chart for each of them."""
 MOST_POINTS = 300
 """Points kept of each curve; when there are more, every other one is dropped."""
 LEAST_TOP_DEG = 50.0
 """The axis of the angle reaches at least to here [°]."""
 SPREAD = (2, 1)
-"""Places of the upper and the lower end of the angle's spread among the series."""
+"""Indices of the upper and lower end of the angle's spread among the series."""
 
 
 class Chart(Panel):
@@ -137,13 +137,13 @@ class PourCurves:
         back = not fresh and status.time < self._time
         self._time = status.time
         if back:
-            # What the status tells of the angle was read before, and is on the curve already.
+            # The angle in this status was read before and is already on the curve.
             self._observed = status.observables
             self._angle.cut(status.time)
             self._spread.cut(status.time)
             self._mass.cut(status.time)
         angle_deg = angle_of_repose_deg(status)
-        # What was not read anew is no point: the chart would draw steps.
+        # An angle that was not read again is not a point: the chart would draw steps.
         if status.observables != self._observed and math.isfinite(angle_deg):
             self._observed = status.observables
             self._angle.add(status.time, angle_deg)
@@ -153,8 +153,8 @@ class PourCurves:
     def columns(self) -> tuple[Array, Array, Array]:
         """Time [s], angle [°], mass [g]; shape (n,) each.
 
-        Between its points a curve is what a line through them is; before the first and after the last angle there is
-        NaN, which the chart leaves out.
+        Between its points, a curve is interpolated linearly; before the first and after the last angle there is NaN,
+        which the chart leaves out.
         """
         (angle_time, angle), (mass_time, mass) = self._angle.columns(), self._mass.columns()
         if not len(mass_time):
@@ -187,7 +187,7 @@ class ThinnedCurve:
         return True
 
     def cut(self, time: float) -> None:
-        """Forget what is later than ``time``."""
+        """Forget points later than ``time``."""
         self._points = [point for point in self._points if point[0] <= time]
 
     def columns(self) -> tuple[Array, Array]:
@@ -212,7 +212,7 @@ class Marks:
         return new
 
     def new_label(self, events: Sequence[Event], generation: int, wall: float) -> str | None:
-        """Another text for the legend, not too soon after the last one; None where it stays. ``wall``: a clock [s]."""
+        """New text for the legend, not too soon after the last one; None if it stays. ``wall``: a clock [s]."""
         label = change_label(events, generation)
         if label == self._label or wall < self._label_due:
             return None
@@ -250,7 +250,7 @@ def with_marks(columns: Sequence[Array], times: Sequence[float]) -> tuple[Array,
 def _between(moments: Array, time: Array, curve: Array) -> Array:
     """``curve`` at ``moments`` on the lines through its points.
 
-    Where it begins later or ends earlier than the others (NaN) there is NaN again. A curve without NaN goes on level:
+    Where it begins later or ends earlier than the others (NaN), there is NaN again. A curve without NaN stays level:
     uPlot finds no range for an axis among numbers that include NaN.
     """
     known = np.isfinite(curve)

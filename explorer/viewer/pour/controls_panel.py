@@ -1,4 +1,4 @@
-"""The controls that stay in sight: six sliders, *Pour again* (by key too), and *Pour a second* for a pile beside it.
+"""The controls that are always visible: six sliders, *Pour again* (also by key), and *Pour a second* beside it.
 
 Five act on the running pour; the feed rate acts on the next one. Each stands for one physical quantity, wherever in the
 scene it occurs; what one slider moves together is set apart under Set-up.
@@ -26,7 +26,7 @@ FEED_RATE = "insertion.rate"
 
 
 class ControlsPanel(RebuiltPanel["Controls"]):
-    """What is always in sight."""
+    """The controls that are always visible."""
 
     name, tab = "controls", CONTROLS
 
@@ -36,7 +36,7 @@ class ControlsPanel(RebuiltPanel["Controls"]):
         add_keys(page.server.gui, {RESTART: self._again}, KEYS, page.post)
 
     def _again(self) -> None:
-        """What the timeline and its key ask for: the same as *Same seed*, with the feed rate that was entered."""
+        """Carry out the timeline's button and key: the same as *Same seed*, with the feed rate that was entered."""
         self._controls.pour(0)
 
     def build(self, scene: Scene) -> Controls:
@@ -94,7 +94,7 @@ class Controls:
             control.follow(status.scene)
 
     def _build(self, scene: Scene) -> None:
-        """Sliders for ``scene``, in place of those that there were."""
+        """Make sliders for ``scene``, in place of the former ones."""
         for control in self._live:
             control.remove()
         known, page = parameters(scene), self._page
@@ -107,7 +107,7 @@ class Controls:
             ]
 
     def pour(self, step: int) -> None:
-        """Pour anew with the feed rate that was entered, and the ``step``-th seed after the present one."""
+        """Pour again with the entered feed rate and the ``step``-th seed after the present one."""
         status = self._session.status()
         scene = status.scene
         if self._feed is not None:

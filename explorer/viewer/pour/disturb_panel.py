@@ -1,6 +1,6 @@
-"""Tap and shake the plate, or pull one body: what friction, restitution and stiffness do to a pile that stands.
+"""Tap and shake the plate, or pull one body: what friction, restitution and stiffness do to a standing pile.
 
-All of it is an event of the pour, in SI, and the pour can be brought back to before it and into the middle of it.
+Each disturbance is an event of the pour, in SI, and the pour can be brought back to before it or into the middle of it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ STANDARD_GRAVITY = 9.80665
 """[m/s²]"""
 DIRECTIONS = {"up": (0, 0, 1), "along x": (1, 0, 0), "against x": (-1, 0, 0), "along y": (0, 1, 0), "down": (0, 0, -1)}
 TOPMOST = 0
-"""Number in the box that stands for the body on top of the pile."""
+"""Number in the box that means the body on top of the pile."""
 LARGEST_FORCE = 1000.0
 """[mN]"""
 MM, MS, MN = 1e-3, 1e-3, 1e-3
@@ -55,11 +55,11 @@ class DisturbPanel(Panel):
             self._direction = gui.add_dropdown("Pull: direction", tuple(DIRECTIONS))
 
     def show(self, now: Now) -> None:
-        """What the buttons would do, and what is being done."""
+        """Show what the buttons would do, and what is being done."""
         self._frame = now.frame
         try:
             planned = disturbance_html(self._planned_tap(), self._planned_shake(), now.status.disturbance)
-        except ValueError as error:  # a number that the box takes and the plate does not
+        except ValueError as error:  # a number that the box accepts but the plate does not
             planned = small_html(escape(str(error)))
         if self._text.content != planned:
             self._text.content = planned
@@ -90,7 +90,7 @@ def _number(box: Any, name: str) -> float:
 
 
 def topmost(frame: Frame | None) -> int:
-    """The body in the domain that lies highest within 0.1 m of the axis; CommandError where there is none."""
+    """The body in the domain that lies highest within 0.1 m of the axis; raises CommandError if there is none."""
     if frame is not None:
         near = frame.inside & (np.hypot(frame.position[:, 0], frame.position[:, 1]) < 0.1)
         if near.any():

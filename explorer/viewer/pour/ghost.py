@@ -1,4 +1,4 @@
-"""The former pile, grey and half transparent, where a pile that stood is poured again with other parameters."""
+"""The former pile, grey and half transparent, when a standing pile is poured again with other parameters."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class Rest:
     time: float
     frame: Frame
     angle: float
-    """[°]; NaN where there is none."""
+    """[°]; NaN if there is none."""
 
 
 class Ghost:
-    """The pile that stood before this pour; ``former`` is None where none is drawn."""
+    """The pile that stood before this pour; ``former`` is None if none is drawn."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
@@ -38,7 +38,7 @@ class Ghost:
         self.former: Rest | None = None
 
     def leave(self, rest: Rest, frame: Frame) -> None:
-        """Draw ``rest`` as it was seen last, in ``frame``, in place of one before it."""
+        """Draw ``rest`` as last seen, in ``frame``, in place of an earlier ghost."""
         self.take_away()
         kinds = zip(rest.scene.bodies, body_counts(rest.scene), strict=True)
         self._nodes = BodyNodes(
@@ -49,7 +49,7 @@ class Ghost:
         self.former = rest
 
     def take_away(self) -> None:
-        """Off the page."""
+        """Remove the ghost from the page."""
         if self._nodes is not None:
             self._nodes.remove()
         self._nodes = self.former = None

@@ -1,4 +1,4 @@
-"""A grain of one's own without a file: shape, sizes, density and friction are poured, and kept as a material."""
+"""A user's own grain without a file: its shape, sizes, density and friction are poured and kept as a material."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ALONE = (
     "mixtures take a material file."
 )
 FEWEST, MOST, USUAL = 10, 3000, 150
-"""Grains that are poured."""
+"""Number of grains that are poured: least, most, and by default."""
 
 
 class GrainPanel(Panel):
@@ -77,7 +77,7 @@ class GrainPanel(Panel):
         keep.on_click(lambda _: post(self._keep))
 
     def _follow(self) -> None:
-        """Ask for the sizes that the shape has."""
+        """Show the inputs for the sizes of the shape."""
         for name, box in self._sizes.items():
             box.visible = name in SHAPES[self._chosen][1]
 
@@ -89,7 +89,7 @@ class GrainPanel(Panel):
         return shape
 
     def _grain(self) -> Grain:
-        """What stands in the form; raises a ValueError in one line."""
+        """The grain from the form; raises a ValueError in one line."""
         name, shape = check_name(str(self._name.value).strip()), self._chosen
         low, high = 1e3 * LEAST_EXTENT, 1e3 * LARGEST_EXTENT
         lengths = tuple(1e-3 * checked(self._sizes[one].value, low, high, one) for one in SHAPES[shape][1])

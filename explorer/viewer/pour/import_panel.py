@@ -1,4 +1,4 @@
-"""A material out of another program's input that a browser sends: read, kept as a file, poured."""
+"""A material from another program's input file: uploaded, read, kept as a file, poured."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ PROGRAMS = {
     "YADE script": "yade",
     "EDEM table (CSV), or a folder of our export as .zip": "edem",
 }
-"""Choice → how `write_imported` calls it."""
+"""Choice → name for `write_imported`."""
 WAITING = "A script is read, never run. What was converted, what was not taken and what is not said there stands here."
 
 
 class ImportPanel(Panel):
-    """Program, name, upload; what came of it, and a button that pours it."""
+    """Program, name, upload; the result, and a button that pours it."""
 
     name, tab, title = "import", SET_UP, "From LIGGGHTS, YADE, EDEM"
 
@@ -64,7 +64,7 @@ class ImportPanel(Panel):
         self._background.start(f"reading {label(sent)}", find, lambda found: self._show(sent, *found))
 
     def _show(self, sent: str, path: Path, notes: list[str]) -> None:
-        """What was converted, left out and assumed; the file that was written."""
+        """Show what was converted, left out and assumed, and the file that was written."""
         self._kept, self._pour_it.visible = path, True
         lines = "".join(f"<li>{escape(note)}</li>" for note in notes)
         self._told.content = small_html(

@@ -1,4 +1,4 @@
-"""Parameters that act on the running pour: choose materials or pairs, move sliders, read what the solver has.
+"""Parameters that act on the running pour: choose materials or pairs, move sliders, read the solver's values.
 
 Controls are made from the declarations of live parameters: one control moves one parameter of one or many things
 (``live_sliders.py``). One parameter of all pairs is a matrix (``pair_matrix.py``).
@@ -28,7 +28,7 @@ from solver.params import Parameter
 from solver.scenes.scene import Scene, parameters, value
 
 Targets = dict[str, tuple[str, ...]]
-"""Text of a choice → prefixes of the parameter paths that it stands for."""
+"""Text of a choice → prefixes of its parameter paths."""
 
 
 class LivePanel(RebuiltPanel["LiveSections"]):
@@ -87,7 +87,7 @@ class _Section:
                 post(lambda: self._build(session.status().scene, chosen))
 
     def _build(self, scene: Scene, chosen: str) -> None:
-        """Controls for the live parameters of what was chosen, in place of those that there were."""
+        """Make controls for the live parameters of the choice, in place of the former ones."""
         for control in self._live:
             control.remove()
         self._chosen = chosen

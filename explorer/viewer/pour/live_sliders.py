@@ -1,7 +1,7 @@
 """Sliders of the running pour: made from the declaration of a live parameter, with its range, unit and scale.
 
 A parameter declares its range (``param(low=…, high=…)`` beside its default); a slider shows all of it, on a linear or a
-logarithmic scale, and as a factor where it stands for several values that differ.
+logarithmic scale, or as a factor if it controls several values that differ.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ LINEAR_STEP = 0.01
 POWER_DIGITS = 2
 """Decimals of a power of ten: as fine as the slider's step, and no more than its box can show."""
 LARGEST_FACTOR, LARGEST_POWER = 4.0, 100.0
-"""By which values that differ are scaled at most in one go, on a linear and on a logarithmic slider."""
+"""Largest factor by which differing values are scaled at once, on a linear and on a logarithmic slider."""
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 DECADES = 1.0
 """A logarithmic slider reaches this far to either side of the present value, then out to whole decades."""
@@ -50,11 +50,11 @@ class LiveControl:
             self._listen(face, post, apply)
 
     def fits(self, scene: Scene) -> bool:
-        """Whether this kind of control is the one for ``scene``; always while a person is at it."""
+        """Whether this kind of control is the one for ``scene``; always while the user is moving it."""
         return self._held or agree(scene, self._paths)
 
     def follow(self, scene: Scene) -> None:
-        """Move to the solver's value, unless a person is at the control."""
+        """Move to the solver's value, unless the user is moving the control."""
         if self._held:
             return
         number = self._number(scene)
@@ -64,7 +64,7 @@ class LiveControl:
                 face.box.show(shown)
 
     def remove(self) -> None:
-        """Take the control off the page."""
+        """Remove the control from the page."""
         for face in self._faces:
             face.box.handle.remove()
 
@@ -93,7 +93,7 @@ class ScalingControl(LiveControl):
     """
 
     def fits(self, scene: Scene) -> bool:
-        """Whether the values are still those that the factor is counted from, or a person is at it."""
+        """Whether the values are still those that the factor is counted from, or the user is moving the control."""
         found = [float(value(scene, path)) for path in self._paths]
         wanted = self._scaled(self._factor)
         return self._held or all(math.isclose(one, wanted[path]) for path, one in zip(self._paths, found, strict=True))
@@ -132,7 +132,7 @@ def control_for(scene: Scene, paths: Sequence[str]) -> type[LiveControl]:
 
 @dataclass(frozen=True)
 class Face:
-    """One widget of a control. Numbers are in the unit of the screen."""
+    """One widget of a control. Numbers are in the displayed unit."""
 
     box: SharedBox
     shown: Callable[[float], float]
@@ -142,15 +142,15 @@ class Face:
 
 
 def linear_faces(gui: viser.GuiApi, parameter: Parameter, start: float, label: str = "") -> tuple[Face, ...]:
-    """A slider over the declared range, called ``label`` or as the parameter is."""
+    """A slider over the declared range, titled ``label`` or with the parameter's title."""
     name, (low, high) = titled(parameter, label), screen_range(parameter)
     slider = gui.add_slider(name, low, high, LINEAR_STEP, start, hint=parameter.doc)
     return (Face(SharedBox(slider), lambda number: number, lambda entered: checked(entered, low, high, name)),)
 
 
 def log_faces(gui: viser.GuiApi, parameter: Parameter, start: float, label: str = "") -> tuple[Face, ...]:
-    """A number box in the unit of the screen, called ``label`` or as the parameter is, and below it a slider over its
-    power of ten.
+    """A number box in the displayed unit, titled ``label`` or with the parameter's title, and below it a slider over
+    its power of ten.
     """
     name, (low, high) = titled(parameter, label), screen_range(parameter)
     unit = screen_unit(parameter).symbol
@@ -184,7 +184,7 @@ def titled(parameter: Parameter, label: str) -> str:
 
 
 def screen_range(parameter: Parameter) -> tuple[float, float]:
-    """Range of ``parameter`` in the unit of the screen."""
+    """Range of ``parameter`` in the displayed unit."""
     unit = screen_unit(parameter)
     return unit.to_screen(parameter.low), unit.to_screen(parameter.high)
 

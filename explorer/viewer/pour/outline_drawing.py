@@ -22,19 +22,19 @@ Array = npt.NDArray[np.float64]
 
 MM = 1e3
 MARGIN = 4.0
-"""Around the drawing [mm]."""
+"""Margin around the drawing [mm]."""
 LEAST_WIDTH, LEAST_HEIGHT = 60.0, 15.0
-"""Of what is drawn [mm], so that one body alone is not drawn large."""
+"""Least size of what is drawn [mm], so that a single body is not drawn large."""
 SCALE_BAR = 20.0
 """Length of the scale bar [mm]."""
 WAITING = "The silhouette is drawn once there is a pile below the outlet."
 FLANK_RADIUS, MEASURED_RADIUS = 8e-4, 6e-4
-"""Of the lines in 3-D [m]."""
+"""Radii of the lines in 3-D [m]."""
 NOWHERE: Array = np.zeros((0, 2, 3))
 
 
 def outline_html(outline: Outline | None, measured: MeasuredCurve | None) -> str:
-    """The drawing with its caption; in words where there is nothing to draw yet."""
+    """The drawing with its caption; in words if there is nothing to draw yet."""
     parts = [] if outline is None and measured is None else [outline_svg(outline, measured)]
     lines = [WAITING if outline is None else f"View along +y: {flank_words(outline.flanks)}."]
     if measured is not None:
@@ -53,7 +53,7 @@ def outline_svg(outline: Outline | None, measured: MeasuredCurve | None) -> str:
     """The drawing alone; one unit is a millimetre, and both axes have the same scale."""
     curves = [] if outline is None else [(outline.u, outline.top)]
     curves += [] if measured is None else [(measured.u, measured.z)]
-    # Columns of pixels with nothing in them, between the pile and a stray body, take no room.
+    # Empty columns of pixels between the pile and a stray body take no room.
     covered = [(MM * u[z > 0], MM * z[z > 0]) for u, z in curves if (z > 0).any()]
     reach = max([LEAST_WIDTH / 2.0, *(float(np.abs(u).max()) for u, _ in covered)]) + MARGIN
     top = max([LEAST_HEIGHT, *(float(z.max()) for _, z in covered)]) + MARGIN

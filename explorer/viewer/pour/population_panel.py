@@ -1,7 +1,7 @@
-"""Beside the angle of one pour what other seeds give: a strip of the stored pours, and *Pour 8 more*.
+"""The angles that other seeds give, beside that of one pour: a strip of the stored pours, and *Pour 8 more*.
 
 The stored pours are those of exactly the parameters in force, by the keys under which a calibration finds its own.
-After a change of parameters the present ones are held against the former ones: what one pour tells, what more would.
+After a change of parameters, the present pours are compared with the former ones: what one pour shows, what more would.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from solver import Scene
 
 OBSERVABLE = "angle_of_repose_deg"
 MORE = 8
-"""Pours of one order."""
+"""Number of pours in one order."""
 POUR_MORE, POUR_BOTH = f"Pour {MORE} more", "Pour to compare"
 SETTLED = 0.7
-"""Wall time [s] for which parameters have to stay before their pours are looked for: a slider's drag asks once."""
+"""Wall time [s] without change before pours of the parameters are looked up: a slider being dragged asks once."""
 AGAIN = 4.0
-"""Least wall time [s] between two looks at the same parameters, while pours are added to the store."""
+"""Least wall time [s] between two look-ups of the same parameters, while pours are added to the store."""
 TRUSTED = 10
-"""From so many values on the standard deviation is told without its own uncertainty."""
+"""Number of values from which the standard deviation is given without its own uncertainty."""
 WIDTH, HEIGHT, MARGIN, BASE = 300.0, 54.0, 14.0, 27.0
-"""Of the strip; ``BASE``: height of its axis."""
+"""Dimensions of the strip; ``BASE``: height of its axis."""
 BOX_HEIGHT = "7.2em"
-"""Always the same: what stands below must not move under a person's hand."""
+"""Constant height: controls below must not move while the user operates them."""
 DOT = 3.2
 """Radius of a dot."""
 HINT = (
@@ -48,15 +48,15 @@ HINT = (
 
 @dataclass(frozen=True)
 class ThisPour:
-    """The single pour that is seen."""
+    """The single pour on the screen."""
 
     angle: float
     """[°]; NaN where there is none."""
     seed: int
     doubt: str
-    """Why the angle is none of a pile yet; empty where it is."""
+    """Why the angle is not yet that of a pile; empty if it is."""
     changed: bool
-    """Parameters were changed, or the pile disturbed, so that it is no draw of this population."""
+    """Parameters were changed or the pile was disturbed, so it is not a draw from this population."""
 
 
 class PopulationPanel(Panel):
@@ -86,14 +86,14 @@ class PopulationPanel(Panel):
         self._stop.on_click(lambda _: page.post(self._cancel))
 
     def show(self, now: Now) -> None:
-        """Look for pours of the parameters in force, and tell what there is."""
+        """Look up pours of the parameters in force, and show them."""
         status, wall = now.status, time.monotonic()
         if status.scene != self._scene:
             self._scene, self._since = status.scene, wall
         command = self._process.status()
         if self._to_come is not None and not command.alive:
             (scene, pours), self._to_come = self._to_come, None
-            # As an action, so that a refusal is told and ends nothing.
+            # As an action, so that a refusal is reported and ends nothing.
             self._post(lambda: self._begin(scene, pours))
         if self._more.visible == command.alive:
             self._more.visible, self._stop.visible = not command.alive, command.alive
@@ -117,7 +117,7 @@ class PopulationPanel(Panel):
         self._process.close()
 
     def _pour(self) -> None:
-        """More of the present parameters; after a change of the former ones as well, until both have as many."""
+        """Order more pours of the present parameters; after a change also of the former, until both have as many."""
         scene = self._session.status().scene
         if self._former is None or self._found is None or not self._changed or self._found[0] != scene:
             self._begin(scene, MORE)
@@ -134,7 +134,7 @@ class PopulationPanel(Panel):
         self._poured = scene
 
     def _whose(self, scene: Scene) -> str:
-        """Whose pours are made in the background, where it is not ``scene``, which is on the screen."""
+        """Whose pours are made in the background, if not those of ``scene``, which is on the screen."""
         if self._poured is None or self._poured == scene:
             return ""
         former = self._former is not None and self._former[0] == self._poured
@@ -145,7 +145,7 @@ class PopulationPanel(Panel):
         self._process.cancel()
 
     def _look(self, scene: Scene, pour: ThisPour, wall: float) -> None:
-        """Read the store where it may have become another, then compare, both off the loop."""
+        """Read the store if it may have changed, then compare, both off the loop."""
         wanted = scene, self._process.stamp()
         anew = self._found is None or self._found[0] != scene
         if wanted != self._asked_for and (anew or wall >= self._asked_at + AGAIN):
@@ -164,11 +164,11 @@ class PopulationPanel(Panel):
                 self._work.start("comparing pours", lambda: compared(new, single, former), self._take_comparison)
 
     def _take(self, read: Sequence[tuple[Scene, Population]]) -> None:
-        """The population of the parameters in force, and anew that of the former ones."""
+        """Take the population of the parameters in force, and the renewed one of the former parameters."""
         (scene, population), *former = read
         self._former = next(iter(former), self._former)
         if self._found is not None and self._found[0] != scene:
-            # What a slider stood at on its way has no pours; those before it say more.
+            # Intermediate positions of a slider have no pours; the parameters before them say more.
             if self._former is None or self._found[1].n > 1:
                 self._former = self._found
             self._comparison = None
@@ -180,7 +180,7 @@ class PopulationPanel(Panel):
 
 
 def told_difference(former: Scene, scene: Scene) -> str:
-    """What was changed, in words; empty where nothing was that can be compared."""
+    """What was changed, in words; empty if there is nothing to compare."""
     if former.rig.name != scene.rig.name or not same_bodies(former, scene):
         return ""
     return "; ".join(change_lines(differences(former, scene)))
@@ -195,9 +195,9 @@ def population_html(
     former: Population | None = None,
     whose: str = "",
 ) -> str:
-    """Strip, line, comparison and progress; ``changed``: what differs from the ``former`` parameters, "" for none told.
+    """Strip, line, comparison and progress; ``changed``: what differs from the ``former`` parameters, "" for nothing.
 
-    ``whose``: pours that are made in the background, "" for those of the parameters in force.
+    ``whose``: whose pours are made in the background, "" for those of the parameters in force.
     """
     lines = [_process_line(command, whose)]
     if population is None:
@@ -213,7 +213,7 @@ def population_html(
 
 
 def strip_svg(population: Population, pour: ThisPour) -> str:
-    """One dot per seed over an axis in degrees, a bar for mean ± sd, and a mark for the pour that is seen."""
+    """One dot per seed over an axis in degrees, a bar for mean ± sd, and a mark for the pour on the screen."""
     sample, mark = population.sample, pour.angle if math.isfinite(pour.angle) else None
     spread = sample.sd if population.n > 1 else 0.0
     ends = [*population.values, sample.mean - spread, sample.mean + spread, *([] if mark is None else [mark])]
@@ -257,14 +257,14 @@ def strip_svg(population: Population, pour: ThisPour) -> str:
 
 
 def stacked(places: Sequence[float]) -> list[tuple[float, float]]:
-    """Centres of dots at ``places`` along the axis, each as low above it as no other one is in its way."""
+    """Centres of dots at ``places`` along the axis, each as low above it as possible without overlap."""
     rows: list[list[float]] = []
     found: list[tuple[float, float]] = []
     for place in places:
         row = next((k for k, taken in enumerate(rows) if all(abs(place - one) > 2 * DOT for one in taken)), len(rows))
         rows[row:row] = [[]] if row == len(rows) else []
         rows[row].append(place)
-        # More rows than there is room for lie over each other.
+        # Rows for which there is no room overlap.
         found.append((place, max(DOT + 1, BASE - 9 - 2.1 * DOT * row)))
     return found
 

@@ -19,7 +19,7 @@ from solver.scenes.scene import Scene
 FORMED_FOR = 0.5
 """Simulated time [s] over which readings have to agree within their spread before an angle counts as that of a pile."""
 READINGS_KEPT = 200
-"""Of the angle, for a pour that is brought back a little."""
+"""Readings of the angle kept, for a pour that is brought back a little."""
 FORMING, VOID = "forming", "not of a valid pile"
 
 PHASE_WORDS = {
@@ -65,7 +65,7 @@ class Readout(Panel):
         self._angle = AngleDoubt()
 
     def show(self, now: Now) -> None:
-        """Tell what the pour is doing."""
+        """Show what the pour is doing."""
         by_component, doubt = self._look.look.colour_by == COMPONENT, self._angle.doubt(now.status)
         former = self._ghost.former
         html = readout_html(now.status, by_component, doubt, math.nan if former is None else former.angle)
@@ -74,10 +74,11 @@ class Readout(Panel):
 
 
 class AngleDoubt:
-    """Why the angle that is read off a pour is not yet that of a pile: ``FORMING``, ``VOID``, or "" where it is.
+    """Why the angle that is read off a pour is not yet that of a pile: ``FORMING``, ``VOID``, or "" if it is.
 
-    It stands once the pour has come to a valid end. Before that, everything has to be below the outlet, and the angles
-    read over ``FORMED_FOR`` within the last one's spread of each other; so it does in a drum that turns.
+    It is that of a pile once the pour has come to a valid end. Before that, everything has to be below the outlet, and
+    the angles read over ``FORMED_FOR`` must lie within the last one's spread of each other; this also holds in a drum
+    that turns.
     """
 
     def __init__(self) -> None:
@@ -100,15 +101,15 @@ class AngleDoubt:
             return "" if status.outcome.valid else VOID
         begin = status.time - FORMED_FOR
         angles = [angle for time, angle in read if time >= begin]
-        long_enough = read[0][0] <= begin + 1e-9  # less a hair: sums of steps
+        long_enough = read[0][0] <= begin + 1e-9  # within rounding of sums of steps
         agree = found.spread is not None and max(angles) - min(angles) <= found.spread
         return "" if status.phase in (Phase.PILE, Phase.RUN) and long_enough and agree else FORMING
 
 
 def readout_html(status: Status, by_component: bool = True, doubt: str = "", former: float = math.nan) -> str:
-    """The readout. Its height is always the same: what stands below must not move under a person's hand.
+    """The readout. Its height is constant: controls below must not move while the user operates them.
 
-    ``by_component``: whether a body's colour says what it is; a legend of components would be wrong otherwise.
+    ``by_component``: whether a body's colour shows its component; otherwise a legend of components would be wrong.
     ``doubt``: of :class:`AngleDoubt`; an angle in doubt is small and grey. ``former``: angle of the pile before [°].
     """
     components = legend(status.scene) if by_component else ""
@@ -117,18 +118,18 @@ def readout_html(status: Status, by_component: bool = True, doubt: str = "", for
 
 
 def condition(status: Status) -> str:
-    """How the pour stands, in a word of ``OUTCOME_WORDS``, or slower than the wanted speed, or nothing special."""
+    """State of the pour: a word of ``OUTCOME_WORDS``, slower than the wanted speed, or nothing special."""
     return OUTCOME_WORDS.get(status.outcome, SLOWER if status.capped else "")
 
 
 def pace(status: Status) -> str:
-    """Simulated seconds per second, such as "0.42"; of a slow pour one digit, as "0.00" would say that it stands."""
+    """Simulated seconds per second, such as "0.42"; one digit for a slow pour, as "0.00" would mean that it stands."""
     factor = status.real_time_factor
     return f"{factor:.2f}" if factor >= 0.1 else f"{factor:.1g}"
 
 
 def not_later(events: Iterable[Event], status: Status) -> list[Event]:
-    """Events without those of the present pour that, since it was brought back, have not happened yet."""
+    """Events without those of the present pour that, after it was brought back, have not happened yet."""
     return [event for event in events if event.generation != status.generation or event.time <= status.time]
 
 
@@ -142,7 +143,7 @@ def legend(scene: Scene) -> str:
 
 
 def angle_of_repose_deg(status: Status) -> float:
-    """Angle of the pile as it is now [°]; NaN where there is none."""
+    """Present angle of the pile [°]; NaN if there is none."""
     found = status.observables.get("angle_of_repose_deg")
     return math.nan if found is None else found.value
 

@@ -52,7 +52,7 @@ def effect_paths() -> tuple[str, ...]:
 
 
 class RestartPanel(RebuiltPanel["SetUpInputs"]):
-    """What acts on the next pour."""
+    """The settings that act on the next pour."""
 
     name, tab = "set_up", SET_UP
 
@@ -63,7 +63,7 @@ class RestartPanel(RebuiltPanel["SetUpInputs"]):
 
 
 class SetUpInputs:
-    """Number boxes and choices made from the declarations; a button pours anew with all of them."""
+    """Number boxes and choices made from the declarations; a button pours again with all of them."""
 
     def __init__(self, server: viser.ViserServer, session: Session, scene: Scene, seed: int, post: Post) -> None:
         self._session, self._generation = session, session.status().generation
@@ -101,7 +101,7 @@ class SetUpInputs:
         values = {path: entered(p, self._inputs[path].value) for path, p in self._shown.items()}
         seed = int(checked(self._seed.value, 0, LARGEST_SEED, "seed"))
         present = self._session.status().scene
-        # What was not touched stays to the last digit: a number box shows six.
+        # Untouched values stay exact to the last digit: a number box shows six.
         changed = {path: new for path, new in values.items() if not same_value(value(present, path), new)}
         self._session.restart(with_values(present, changed), seed)
 
@@ -116,7 +116,7 @@ def entered(parameter: Parameter, number: object) -> float | str:
 
 
 def on_screen(parameter: Parameter, scene: Scene) -> Any:
-    """What the input of ``parameter`` shows: a number in the unit of the screen, or the name of a choice."""
+    """What the input of ``parameter`` shows: a number in the displayed unit, or the name of a choice."""
     present = value(scene, parameter.path)
     return present if isinstance(present, str) else screen_unit(parameter).to_screen(present)
 
@@ -154,7 +154,7 @@ def parameter_input(gui: viser.GuiApi, parameter: Parameter, scene: Scene) -> An
 
 
 def same_value(old: float | str, new: float | str) -> bool:
-    """Whether a box that shows six digits was left as it was."""
+    """Whether a box that shows six digits was left unchanged."""
     if isinstance(old, str) or isinstance(new, str):
         return old == new
     return abs(old - new) <= 1e-6 * abs(old)

@@ -1,7 +1,7 @@
-"""What happened last, in a box beside the controls; after a change of a pile that stands, whether its bodies moved.
+"""What happened last, in a box beside the controls; after a change to a standing pile, whether its bodies moved.
 
-Friction, restitution and stiffness act on what moves. Poured again with other parameters, the former pile stays as a
-ghost, to compare with the new.
+Friction, restitution and stiffness act on moving bodies. When a pile is poured again with other parameters, the former
+pile stays as a ghost, for comparison with the new one.
 """
 
 from __future__ import annotations
@@ -23,9 +23,10 @@ from explorer.viewer.view import small_html
 from solver import Scene
 
 STOOD, FEW = 5e-4, 0.1
-"""A pile is said to stand where at most this share of its bodies moved by more than this [m], a tenth of a seed."""
+"""A pile counts as standing if at most the share ``FEW`` of its bodies moved by more than ``STOOD`` [m], a tenth of a
+seed."""
 WATCHED = 0.3
-"""Simulated time [s] after a change before that is said."""
+"""Simulated time [s] after a change before this is reported."""
 AT_THE_END = 1e9
 """Order among the controls of the room."""
 BOX = (
@@ -39,7 +40,7 @@ WHEN = {
     "shear_modulus": "stiffness changes overlaps by micrometres, and impacts",
     "poisson_ratio": "stiffness changes overlaps by micrometres, and impacts",
 }
-"""By the last word of a path."""
+"""When a parameter acts, by the last word of its path."""
 OTHERWISE = "it acts when something moves"
 
 
@@ -69,7 +70,7 @@ class StandingPanel(Panel):
         self._frame = now.frame
         self._follow(status, now.frame)
         did = self._what_the_change_did(status, now.frame)
-        # It names the change, and stands in its place.
+        # It names the change and replaces it.
         told = map(escape, notes(status, () if did else now.events, now.notice))
         ghost = "" if former is None else ghost_text(former, status)
         box = box_html([line for line in (ghost, *told, did) if line])
@@ -99,7 +100,7 @@ class StandingPanel(Panel):
         return standing_text(rest.scene, status.scene, moved) if moved.size else ""
 
     def _leave_a_ghost(self, rest: Rest, scene: Scene) -> None:
-        """Of a pile that stood, before it is poured again with other parameters."""
+        """Leave a ghost of a pile that stood, before it is poured again with other parameters."""
         if rest.scene == scene or another_set_up(rest.scene, scene):
             return
         self._ghost.leave(rest, self._frame if self._frame is not None else rest.frame)
@@ -112,14 +113,14 @@ def box_html(lines: Sequence[str]) -> str:
 
 
 def notes(status: Status, events: Sequence[Event], notice: str) -> list[str]:
-    """Each once: what was refused, what the solver says, what happened last."""
+    """What was refused, what the solver says, what happened last; each only once."""
     happened = recent(events, status.generation)
     said = "" if status.message in happened else status.message
     return [text for text in dict.fromkeys((notice, said, happened)) if text]
 
 
 def recent(events: Sequence[Event], generation: int) -> str:
-    """The last moment at which something happened, in one line; empty where nothing did."""
+    """The last moment at which something happened, in one line; empty if nothing did."""
     mine = [event for event in events if event.generation == generation]
     if not mine:
         return ""
@@ -134,7 +135,7 @@ def watched(rest: Rest, status: Status) -> bool:
 
 
 def shifts(before: Frame, now: Frame) -> npt.NDArray[np.float32]:
-    """How far each body moved [m] that is in the domain in both; none where they are not of one pour."""
+    """How far each body that is in the domain in both frames moved [m]; empty if they are not of one pour."""
     if len(before.position) != len(now.position):
         return np.zeros(0, dtype=np.float32)
     both = before.inside & now.inside

@@ -1,6 +1,6 @@
 """Moments of a recording in the form in which a live pour is drawn: frames, and what bodies can be coloured by.
 
-A recording holds places, not velocities: what bodies do between its frames is found by differences.
+A recording holds positions, not velocities: motion between its frames is computed from differences.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ NOT_TOLD = "This one is older: it does not say which body is which, so there are
 class RecordedFrames:
     """Frames of ``recording``, numbered from 1, component by component; bodies that have left are not in them.
 
-    Components are numbered as in the recording's scene; where it holds none, in the order of the file.
+    Components are numbered as in the recording's scene; if it holds none, in the order of the file.
     """
 
     def __init__(self, recording: Recording) -> None:
@@ -34,13 +34,13 @@ class RecordedFrames:
         self._kinds = component_numbers(recording)
         told = tells_who_is_who(recording)
         self.quantities: Mapping[str, ColourQuantity] = QUANTITIES if told else {}
-        """What the bodies can be coloured by."""
+        """Quantities by which the bodies can be coloured."""
         self.note = NOT_RECORDED if told else f"{NOT_RECORDED} {NOT_TOLD}"
-        """What they cannot be coloured by, in words."""
+        """Quantities by which they cannot be coloured, in words."""
         self._first_seen = [first_seen(component) for component in recording.components]
 
     def number_at(self, time: float) -> int:
-        """Number of the frame that holds at ``time`` [s], the first one for all that is before it."""
+        """Number of the frame valid at ``time`` [s]; the first one for earlier times."""
         return 1 + (index_at(self._recording.times, time) or 0)
 
     def frame(self, number: int) -> Frame:
@@ -69,7 +69,7 @@ class RecordedFrames:
         return poses
 
     def motion(self, number: int) -> RecordedMotion:
-        """What its bodies can be coloured by; call it for recordings that have ``quantities`` only."""
+        """Quantities for colouring the bodies of a frame; call it only for recordings that have ``quantities``."""
         time, there = self._at(number)
         speeds = [mean_speeds(component, time) for component in self._recording.components]
         since = [seen[one.place] for seen, one in zip(self._first_seen, there, strict=True)]
@@ -82,14 +82,14 @@ class RecordedFrames:
 
 @dataclass(frozen=True, eq=False)
 class RecordedMotion:
-    """What is known of the n bodies of a frame. NaN where nothing is."""
+    """What is known about the n bodies of a frame; NaN if nothing is."""
 
     number: int
-    """Of the frame."""
+    """Number of the frame."""
     speed: Array
     """[m/s], shape (n,)."""
     residence: Array
-    """Time since a body is first in the recording [s], shape (n,)."""
+    """Time since a body first appeared in the recording [s], shape (n,)."""
 
 
 QUANTITIES: Mapping[str, ColourQuantity] = {
@@ -106,7 +106,7 @@ QUANTITIES: Mapping[str, ColourQuantity] = {
         "s", 1.0, lambda motion: motion.residence, "time since a body is first in the recording", 0.1
     ),
 }
-"""Of a recording that says in every frame which body is which."""
+"""Quantities of a recording that identifies the bodies in every frame."""
 
 
 def component_numbers(recording: Recording) -> list[int]:
@@ -118,15 +118,15 @@ def component_numbers(recording: Recording) -> list[int]:
 
 
 def tells_who_is_who(recording: Recording) -> bool:
-    """Whether the file says in every frame which body is which."""
+    """Whether the file identifies the bodies in every frame."""
     return all(frame.place is not None for component in recording.components for frame in component.frames)
 
 
 def mean_speeds(component: Component, time: float) -> Array:
     """Distance from the frame before to the frame after ``time``, over the time between them [m/s], shape (n,).
 
-    For a body that is not in one of the two it is the distance from or to where it is; NaN where it is in neither, and
-    for all where the file does not say who is who. Between frames a body moves on a curve, so it is faster than this.
+    For a body missing in one of the two, it is the distance from or to its present position; NaN if it is in neither,
+    and for all if the file does not identify bodies. Between frames a body moves on a curve, so it is faster than this.
     """
     k = index_at(component.times, time)
     if k is None:
@@ -134,7 +134,7 @@ def mean_speeds(component: Component, time: float) -> Array:
     here, now = component.frames[k], float(component.times[k])
     start, began = here.position.astype(np.float64), np.full(len(here.scale), now)
     end, ended = start.copy(), began.copy()
-    # Not simply the neighbours: the last frame of a pour may be there twice.
+    # Not simply the neighbours: the last frame of a pour may occur twice.
     before = index_at(component.times, now - 2.0 * SAME_TIME)
     after = int(np.searchsorted(component.times, now + SAME_TIME, side="right"))
     if before is not None:
@@ -148,7 +148,7 @@ def mean_speeds(component: Component, time: float) -> Array:
 
 
 def first_seen(component: Component) -> Array:
-    """When each body is first in the recording [s], by its place in the order of entry; NaN where it never is."""
+    """When each body first appears in the recording [s], by its place in the order of entry; NaN if it never does."""
     frames = [(time, frame.place) for time, frame in zip(component.times, component.frames, strict=True)]
     known = [(time, place) for time, place in frames if place is not None and len(place)]
     seen = np.full(max((int(place.max()) + 1 for _, place in known), default=0), np.nan)

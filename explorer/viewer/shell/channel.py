@@ -63,7 +63,7 @@ class ShellChannel:
             return {key: json.loads(text) for key, text in self._told.items()}
 
     def take(self, message: str | bytes) -> None:
-        """Carry out what a browser sent; what is no command is nothing."""
+        """Carry out what a browser sent; anything that is not a command is ignored."""
         if not isinstance(message, str) or len(message) > LONGEST_COMMAND:
             return
         try:
@@ -76,7 +76,7 @@ class ShellChannel:
             act(command)
 
     async def handle(self, connection: ServerConnection) -> None:
-        """Serve one browser until it goes."""
+        """Serve one browser until it disconnects."""
         changed = asyncio.Event()
         changed.set()
         with self._lock:
@@ -95,7 +95,7 @@ class ShellChannel:
                 del self._waiting[connection]
 
     async def _tell_changes(self, connection: ServerConnection, changed: asyncio.Event) -> None:
-        """Send what is new to this browser; what changes while it is slow is sent as it is then, not piled up."""
+        """Send what is new to this browser; for a slow one, only the newest state is sent, and nothing piles up."""
         sent: dict[str, str] = {}
         with contextlib.suppress(websockets.ConnectionClosed):
             while await changed.wait():

@@ -1,4 +1,4 @@
-"""A pour that a link holds: offered by the browser that was opened with it, poured where a person says so."""
+"""A pour that a link holds: offered by the browser that was opened with it, and poured if the user agrees."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The state line above the page: the project, how far each of its steps is, and what is next."""
+"""The state line above the page: the project, the progress of each of its steps, and what is next."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from explorer.viewer.panel import AROUND, SELDOM, Now, PageContext, Panel
 
 
 class StateLine(Panel):
-    """Asks project, pour and the commands in the background; told to the browsers as one small object."""
+    """Collects the state of project, pour and background commands, and sends it to browsers as one small object."""
 
     name, tab, every = "state_line", AROUND, SELDOM
 
@@ -41,12 +41,12 @@ class StateLine(Panel):
         self._page = page
         try:
             self._targets = load_study(str(page.project.study)).targets
-        except ValueError:  # told where the study is started
+        except ValueError:  # reported when the study is started
             self._targets = ()
         self._study, self._diagnosis = NewestResult(STUDY_RESULT), NewestResult(DIAGNOSIS_RESULT)
 
     def show(self, now: Now) -> None:
-        """Tell the browsers how far the project is."""
+        """Send the progress of the project to the browsers."""
         steps = self._steps(now)
         text, room = next_step(steps)
         self._page.channel.tell(
@@ -89,7 +89,7 @@ class StateLine(Panel):
 
 
 class NewestResult:
-    """Verdict of the newest finished result, read again only where its file has changed."""
+    """Verdict of the newest finished result, read again only if its file has changed."""
 
     def __init__(self, name: str) -> None:
         self._file = ResultFile(name)
@@ -97,7 +97,7 @@ class NewestResult:
         self._found: Finished | None = None
 
     def of(self, folders: tuple[Path, ...], read: FinishedReader) -> Finished | None:
-        """The verdict of the first of ``folders``; None where there is none that can be read."""
+        """The verdict of the first of ``folders``; None if there is none that can be read."""
         folder = next(iter(folders), None)
         content = self._file.read(folder)
         if self._file.version != self._version:
@@ -118,13 +118,13 @@ def study_finished(content: Mapping[str, Any], folder: Path) -> Finished:
 
 
 def diagnosis_finished(content: Mapping[str, Any], folder: Path) -> Finished:
-    """What a finished diagnosis found, and on which data: they need not be of the material on the screen."""
+    """What a finished diagnosis found, and on which data: these need not be of the material on the screen."""
     result = DiagnosisResult.from_dict(content)
     found = _finished(diagnosis_banner(result), folder)
     return replace(found, said=f"{result.data.title}: {found.said}")
 
 
 def _finished(banner: Banner, folder: Path) -> Finished:
-    """The verdict of the report, in small letters."""
+    """The verdict of the report, in lower case."""
     said = f"{banner.word.lower()} {banner.of}".strip()
     return Finished(said, banner.word.tone != "bad", (folder / REPORT).is_file())

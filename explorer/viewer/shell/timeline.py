@@ -1,4 +1,4 @@
-"""The timeline below the page: play, pause, step, go to a moment, speed; what happened when; by key too."""
+"""The timeline below the page: play, pause, step, go to a moment, speed, also by keys; and what happened when."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ SLOWEST, FASTEST = 0.05, 2.0
 """Range of the speed: simulated seconds per second."""
 SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0)
 MOST_EVENTS = 60
-"""Events on the timeline; older ones are left out."""
+"""Events on the timeline at most; older ones are left out."""
 PREVIEWED = "recording of this pour, while the solver loads"
 LONGEST_EVENT, LONGEST_NOTICE = 120, 400
-"""Characters."""
+"""Longest texts of an event and of a notice [characters]."""
 
 
 class Timeline(Panel):
-    """Talks to the session; what it shows is told to the browsers as one small object."""
+    """Controls the session; its state is sent to the browsers as one small object."""
 
     name, tab = "timeline", AROUND
 
@@ -44,7 +44,7 @@ class Timeline(Panel):
         add_keys(page.server.gui, acts, KEYS, post)
 
     def show(self, now: Now) -> None:
-        """Tell the browsers where the pour is."""
+        """Send the state of the pour to the browsers."""
         page = self._page
         busy = page.bench_work.busy_with or page.background.busy_with
         page.channel.tell("timeline", timeline_state(now, page.recording.state.words, busy))
@@ -68,8 +68,8 @@ class Timeline(Panel):
 
 
 def timeline_state(now: Now, recording: str, busy: str = "") -> Mapping[str, Any]:
-    """What the timeline shows; ``recording``: what is recorded, in a few words, empty if nothing is; ``busy``: likewise
-    what is being done beside the pour.
+    """What the timeline shows; ``recording``: what is being recorded, in a few words, empty if nothing is; ``busy``:
+    the same for work beside the pour.
     """
     status = now.status
     earliest = status.earliest if math.isfinite(status.earliest) else 0.0

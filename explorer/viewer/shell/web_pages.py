@@ -1,6 +1,6 @@
-"""Pages beside viser's own on its port: reports, boards of studies, and the first page with what stands around it.
+"""Pages beside viser's own on its port: reports, boards of studies, and the first page with its surroundings.
 
-An address names an entry that this program made; no path of a file comes from a browser. All of it is read only.
+An address names an entry that this program made; a browser never sends a file path. All pages are read-only.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from explorer.errors import CommandError
 
 HERE = Path(__file__).parent
 TITLE = "<title>Viser</title>"
-"""Of viser's first page; in its place come our title, style and script."""
+"""Title of viser's first page, which is replaced by our title, style and script."""
 TEXT = """<title>{title}</title>
     <link rel="stylesheet" href="/shell/text.css" />
     <script src="/shell/accessibility.js" type="module"></script>"""
@@ -33,7 +33,7 @@ AROUND = """
     </script>
     <link rel="stylesheet" href="/shell/shell.css" />
     <script src="/shell/shell.js" type="module"></script>"""
-"""What is behind the # of the address is taken out before viser's script, which makes that of its socket from it."""
+"""The part of the address after # is removed before viser's script runs, which derives its socket address from it."""
 SHIPPED = ("element.js", "accessibility.js", "text.css", "shell.js", "shell.css", "board.html", "board.js", "board.css")
 """Files beside this one that are served."""
 HTML, JSON = "text/html; charset=utf-8", "application/json"
@@ -50,9 +50,9 @@ KINDS: Mapping[str, str] = {
     ".png": "image/png",
     ".rrd": "application/octet-stream",
 }
-"""Ending of a file's name → what a browser is told that it is; others are not served."""
+"""Suffix of a file name → media type sent to the browser; other files are not served."""
 FOREIGN = ("cross-site", "same-site")
-"""What a browser says of a request (`Sec-Fetch-Site`) that comes from another page than ours."""
+"""Values of `Sec-Fetch-Site` that a browser sends for requests from pages other than ours."""
 GUARD = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "SAMEORIGIN",
@@ -60,7 +60,7 @@ GUARD = {
     "Referrer-Policy": "no-referrer",
 }
 LETTERS = 12
-"""Of the id of a folder."""
+"""Length of the id of a folder."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class WebPage:
 class WebPages:
     """Addresses and what makes their pages.
 
-    ``title`` is that of the first page; ``around``: it has a state line and a timeline, and so a channel.
+    ``title``: of the first page; ``around``: whether it has a state line and a timeline, and hence a channel.
     """
 
     def __init__(self, title: str, around: bool = True) -> None:
@@ -94,7 +94,7 @@ class WebPages:
         }
 
     def publish(self, address: str, page: WebPage) -> None:
-        """Serve ``page`` at ``address`` from now on, in place of one before it."""
+        """Serve ``page`` at ``address`` from now on, in place of a former one."""
         self._pages[address] = lambda: page
 
     def publish_made(self, address: str, make: Callable[[], WebPage]) -> None:
@@ -102,7 +102,7 @@ class WebPages:
         self._pages[address] = make
 
     def page(self, address: str) -> WebPage:
-        """What is served at ``address``. Raises KeyError where nothing is."""
+        """What is served at ``address``. Raises KeyError if nothing is."""
         return self._pages[address]()
 
     def publish_folder(self, folder: Path) -> str:
@@ -115,7 +115,7 @@ class WebPages:
         return address
 
     def answer(self, request: Request) -> Response | None:
-        """What is sent for ``request``; None where it is for viser."""
+        """The response to ``request``; None if it is for viser."""
         path = request.path.partition("?")[0]
         make = self._pages.get(path)
         if make is None:
@@ -131,7 +131,7 @@ class WebPages:
             if request.headers.get("If-None-Match") == page.tag:
                 return Response(HTTPStatus.NOT_MODIFIED, "Not Modified", Headers({"ETag": page.tag, **GUARD}))
             return _response(page, "gzip" in request.headers.get("Accept-Encoding", ""))
-        except OSError:  # a file that is not there any more
+        except OSError:  # a file that no longer exists
             return _refusal(HTTPStatus.NOT_FOUND)
 
 
@@ -141,9 +141,9 @@ def folder_id(folder: Path) -> str:
 
 
 def first_page(title: str, viser_page: str, around: bool = True) -> str:
-    """viser's first page with our title and style, and the script of what stands ``around`` it.
+    """viser's first page with our title and style, and the script for what is ``around`` it.
 
-    Raises CommandError where it is not the page known here.
+    Raises CommandError if it is not the page known here.
     """
     if viser_page.count(TITLE) != 1:
         raise CommandError(f"viser {viser.__version__}: its first page has no {TITLE}, another version is needed")

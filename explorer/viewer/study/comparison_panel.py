@@ -35,7 +35,7 @@ class ComparisonPanel:
         self._version: Hashable = None
 
     def offer(self, folders: Sequence[Path]) -> None:
-        """The finished studies that there are now."""
+        """Offer the present finished studies."""
         self._chooser.offer(folders)
 
     def show(self, result: AnyStudy | None, folder: Path | None, version: Hashable) -> None:
@@ -62,11 +62,11 @@ class ComparisonPanel:
 
 
 def comparison_markdown(one: StudyResult, other: Mapping[str, Any], names: tuple[str, str]) -> str:
-    """The tables, or one line where the other file is not a whole result."""
+    """The tables, or one line if the other file is not a complete result."""
     try:
         tables = comparison(one, StudyResult.from_dict(other), names)
     except RecordError as error:
-        # A folder that somebody named may hold any JSON, also that of another version.
+        # A folder named by the user may hold any JSON, also that of another version.
         return f"These two cannot be compared: {escaped(str(error))}"
     return "\n\n".join(table_markdown(table) for table in tables)
 

@@ -60,17 +60,17 @@ AUTOMATIC = (
     f"then {Budget().more} at a time for effects still undecided."
 )
 FIRST = "trefoil_2"
-"""Chosen at first, where it is shipped: the data set of `make diagnose`."""
+"""Chosen at first, if it is shipped: the data set of `make diagnose`."""
 OWN = "folder below"
 """Choice of the list that takes the folder in the text field."""
 PRESENT = "present or newest diagnosis"
 FILL_IN = "Fill it in, in a table"
 NARROW = 900
-"""Pixels of a picture in which three piles stand too close to be told apart."""
+"""Width [px] of a picture in which three piles are too close to be told apart."""
 
 
 class DiagnosisPanel(Panel):
-    """Talks to a :class:`DiagnosisProcess`; data sets to choose from are those shipped, and those uploaded."""
+    """Controls a :class:`DiagnosisProcess`; the data sets to choose from are shipped or uploaded."""
 
     name, tab, every = "diagnosis", DIAGNOSE, SELDOM
 
@@ -141,7 +141,7 @@ class DiagnosisPanel(Panel):
         self._board = BoardView(server, page.pages, "/diagnosis/page.json", "Diagnosis")
 
     def _to_resume(self, status: CommandStatus) -> Path | None:
-        """Folder to go on in, looked up anew for other data, and when a diagnosis begins or ends: it reads folders."""
+        """Folder in which to continue, looked up again only for other data or when a diagnosis begins or ends."""
         chosen = self._chosen_data()
         if (status.state, chosen) != self._looked:
             self._looked, self._stopped = (status.state, chosen), self._diagnosis.stopped(Question(chosen))
@@ -157,11 +157,11 @@ class DiagnosisPanel(Panel):
         self._diagnosis.queue(self._question())
 
     def _offered(self) -> tuple[str, ...]:
-        """What the list of data sets holds now."""
+        """Present entries of the list of data sets."""
         return (*self._of_project(), *self._shipped, *self._kept(), OWN)
 
     def _of_project(self) -> dict[str, Path]:
-        """The project's own data set, by its title in the list, where it names one."""
+        """The project's own data set, by its title in the list, if it names one."""
         return {} if self._measured is None else {f"{self._measured.name} (project)": self._measured}
 
     def _kept(self) -> dict[str, Path]:
@@ -179,7 +179,7 @@ class DiagnosisPanel(Panel):
         return Question(self._chosen_data(), self._candidates.effects, self._candidates.budget)
 
     def show(self, now: Now) -> None:
-        """Ask the diagnosis how far it is."""
+        """Show the progress of the diagnosis."""
         offered = self._offered()
         if tuple(self._data.options) != offered:
             self._data.options = offered
@@ -187,7 +187,7 @@ class DiagnosisPanel(Panel):
             self._folder.visible = self._data.value == OWN
         self._place.show()
         status = self._diagnosis.status()
-        # How much more is poured, in this stage and after it, is decided by what comes out.
+        # How much more is poured, in this stage and later, depends on the results.
         waiting = self._diagnosis.waiting()
         stopped = self._to_resume(status)
         goes_on = stopped is not None and stopped == self._diagnosis.out
@@ -200,7 +200,7 @@ class DiagnosisPanel(Panel):
         self._show_board()
 
     def _follow(self) -> None:
-        """Show the chosen result where it is another one than before."""
+        """Show the chosen result if it has changed."""
         folder = self._chooser.folder or self._present()
         content = self._file.read(folder)
         shown = (folder, self._file.version)
@@ -211,12 +211,12 @@ class DiagnosisPanel(Panel):
         try:
             self._result = None if content is None else DiagnosisResult.from_dict(content)
         except RecordError as error:
-            # A folder that somebody named may hold any JSON, also that of another version.
+            # A folder named by the user may hold any JSON, also that of another version.
             self._result, trouble = None, escaped(f"{folder}: {error}")
         self._trouble.content = trouble
 
     def _offer_piles(self) -> None:
-        """What there is an answer for; and a way back from it."""
+        """Enable what the answer allows, and the way back from it."""
         found = self._result is not None
         for buttons, visible in (
             (self._piles, found or self._former is not None),
@@ -246,7 +246,7 @@ class DiagnosisPanel(Panel):
         self._page.beside.show_measured(piles.measured, measured_sign(piles), piles.before)
 
     def _pour_corrected(self) -> None:
-        """The corrected model as the page's own pour."""
+        """Pour the corrected model as the page's own pour."""
         result = self._found()
 
         def begin(piles: AnswerPiles) -> None:
@@ -266,7 +266,7 @@ class DiagnosisPanel(Panel):
         self._page.study.start(SHORT_PROFILE, file=file)
 
     def _ask_further(self) -> None:
-        """Another diagnosis of the same data, with the effect that this one found in the model."""
+        """Start another diagnosis of the same data, with the effect found by this one in the model."""
         result, folder = self._found(), self._chooser.folder or self._present()
         if not result.handed_on():
             raise CommandError("no effect here is probable enough to be named, so there is none to continue from")
@@ -280,7 +280,7 @@ class DiagnosisPanel(Panel):
         return folder, ["diagnose", result.data.folder]
 
     def _pour(self, scene: Scene) -> int:
-        """Pour a scene of the answer with the seed on the screen, and remember the person's own pour; the seed."""
+        """Pour a scene of the answer with the seed on the screen, and remember the user's own pour; return the seed."""
         session = self._page.session
         status = session.status()
         if session.source != self._answer:
@@ -290,7 +290,7 @@ class DiagnosisPanel(Panel):
         return status.seed
 
     def _back(self) -> None:
-        """The pour that was on the screen before an answer took its place, once more."""
+        """Pour again what was on the screen before an answer replaced it."""
         if self._former is None:
             raise CommandError("your own pour is on the screen")
         self._page.beside.close()
@@ -299,7 +299,7 @@ class DiagnosisPanel(Panel):
         self._former = None
 
     def _present(self) -> Path | None:
-        """Folder of the diagnosis that was started last, or before any the newest finished one."""
+        """Folder of the diagnosis that was started last; before the first start, the newest finished one."""
         return self._diagnosis.out or next(iter(self._diagnosis.finished()), None)
 
     def _found(self) -> DiagnosisResult:
@@ -308,33 +308,33 @@ class DiagnosisPanel(Panel):
         return self._result
 
     def _show_board(self) -> None:
-        """The board of what is chosen."""
+        """Show the board of the chosen result."""
         chosen, result = self._chooser.folder, self._result
         status = self._diagnosis.status() if chosen is None else None
         self._board.show(
             self._shown,
             chosen or self._present(),
             status,
-            # While it works, what it has found before is no answer to what was asked now.
+            # While it runs, its earlier finding is not an answer to the present question.
             lambda status, report: diagnosis_board(None if status and status.alive else result, status, report),
         )
 
 
 def fold_beside_narrow(page: PageContext) -> None:
-    """Fold the study panel away where it leaves a browser too little width for three piles."""
+    """Collapse the study panel if it leaves a browser too little width for three piles."""
     widths = [client.camera.image_width for client in page.server.get_clients().values()]
     if any(0 < width < NARROW for width in widths):
         page.study_panel.minimize()
 
 
 def measured_sign(piles: AnswerPiles) -> str:
-    """What stands above the measured pile: its condition and its angle, mean ± standard deviation over pours."""
+    """Text above the measured pile: its condition and its angle, mean ± standard deviation over pours."""
     shown = "measured, mean profile" if piles.measured and piles.measured.of_revolution else "measured"
     return f"{shown} ({piles.condition.name}){angle_line(*piles.angle)}"
 
 
 def poured_sign(model: str, mean: float, sd: float, pours: int) -> str:
-    """What stands above a model's pile: what all its fresh pours gave, as one pour alone may say the opposite."""
+    """Text above a model's pile: the result of all its fresh pours, as a single pour may say the opposite."""
     angle = angle_line(mean, sd) if pours > 1 else ""
     return f"{model}{angle} over {pours} pours" if angle else model
 
@@ -346,7 +346,7 @@ def angle_line(mean: float, sd: float) -> str:
 
 
 class FollowUp:
-    """What an answer asks for that is left open or can be checked: taken along, filled in, and answered with."""
+    """The follow-up of an answer that is open or can be checked: downloaded, filled in, and used for a new answer."""
 
     def __init__(self, page: PageContext, begin: Callable[[DiagnosisResult, Path], None]) -> None:
         gui, post = page.server.gui, page.post
@@ -366,7 +366,7 @@ class FollowUp:
             filled = gui.add_upload_button(
                 "Upload it filled in", mime_type=".zip", hint="The folder as .zip, its tables filled in, scans added."
             )
-            # In a place of its own, as viser's client shows a button of uploads whether it is visible or not.
+            # In a folder of its own, because viser's client shows an upload button whether it is visible or not.
             self._scans = gui.add_folder(None)
             with self._scans:
                 scan = gui.add_upload_button(
@@ -412,7 +412,7 @@ class FollowUp:
 
     def _answer(self) -> None:
         result, folder = self._asked()
-        # Read here first: what is missing or wrong is told at once, and not by a process that has failed.
+        # Read here first: missing or wrong data are reported at once, not by a process that has failed.
         self._page.background.start(
             "reading the follow-up", lambda: read_next(folder), lambda _: self._begin(result, folder)
         )
@@ -424,7 +424,7 @@ class FollowUp:
 
 
 def _written(folder: Path) -> tuple[int, ...]:
-    """When tables and scans in ``folder`` were written."""
+    """Times at which tables and scans in ``folder`` were written."""
     written = []
     for file in sorted((*folder.iterdir(), *folder.glob("scans/*"))):
         with suppress(FileNotFoundError):  # another program may be at work in it
@@ -471,7 +471,7 @@ class CandidateEffects:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """The effects that are asked about, () for all. Raises ValueError where none is left."""
+        """The effects that are asked about, () for all. Raises ValueError if none is left."""
         chosen = tuple(name for name, box in self._boxes.items() if box.value)
         if not chosen:
             raise ValueError("effects: none is chosen; at least one is needed")
@@ -479,6 +479,6 @@ class CandidateEffects:
 
     @property
     def budget(self) -> int | None:
-        """About so many pours before the first closer look; None: as many as the program takes by itself."""
+        """Approximate number of pours before the first closer look; None: the program's own choice."""
         pours = checked(self._pours.value, 0, MOST_POURS, "pours")
         return round(pours) or None

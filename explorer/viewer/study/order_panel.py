@@ -1,4 +1,4 @@
-"""What the next study is asked for: ranges of its factors and the target, as in the file or changed here."""
+"""The order for the next study: ranges of its factors and the target, as in the file or changed here."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from solver import parameters
 
 TARGET_WORDS = {"mean": "mean", "sd": "SD", "margin": "counts as met within ±"}
 MEASURED_KEYS = ("mean", "sd", "n")
-"""Of a target, what photographs give."""
+"""Keys of a target that photographs give."""
 COLUMNS = "Low, high and measured value of each factor; the study starts from these ranges."
 LARGEST = 1e12
-"""No number of a target is beyond this."""
+"""Largest number in a target."""
 
 
 class OrderPanel:
-    """Low, high and reference of every factor in a row of its own, and the first target; ``edits`` is what was changed.
+    """Low, high and reference of every factor in a row of its own, and the first target; ``edits`` holds the changes.
 
-    ``study`` is that of ``file``, None where it cannot be read.
+    ``study`` is that of ``file``, None if it cannot be read.
     """
 
     def __init__(self, server: viser.ViserServer, file: Path, study: Study | None, post: Post) -> None:
@@ -57,12 +57,12 @@ class OrderPanel:
 
     @property
     def edits(self) -> StudyEdits:
-        """What is asked otherwise than in the file; SI. Photographs have the word on what they measured."""
+        """What differs from the file; SI. Photographs take precedence for what they measured."""
         target = {key: value for key, value in self._target.items() if key not in self._photographed}
         return StudyEdits({name: dict(values) for name, values in self._ranges.items()}, target)
 
     def follow(self, photographed: bool) -> None:
-        """Show mean, SD and number of the target only while they are those of the file."""
+        """Show mean, SD and number of the target only while they come from the file."""
         first = OBSERVABLE if self._study is None else self._study.targets[0].observable
         hidden = MEASURED_KEYS if photographed and first == OBSERVABLE else ()
         if hidden == self._photographed:
@@ -106,7 +106,7 @@ class OrderPanel:
         return low, high, reference
 
     def ranges(self) -> list[RangeRow]:
-        """Every factor as it stands now, in the units of the screen."""
+        """Every factor at present, in displayed units."""
         if self._study is None:
             return []
         return [
@@ -117,7 +117,7 @@ class OrderPanel:
         ]
 
     def take_ranges(self, ranges: Mapping[str, Range]) -> None:
-        """Take low, high and measured value of factors, in the units of the screen; all of them, or none."""
+        """Take low, high and measured value of factors, in displayed units; all of them, or none."""
         changed = {name: self._changed(name, sent) for name, sent in ranges.items()}
         self._ranges = {name: values for name, values in (self._ranges | changed).items() if values}
         for name, sent in ranges.items():
@@ -130,7 +130,7 @@ class OrderPanel:
         self._tell()
 
     def _changed(self, name: str, sent: Range) -> dict[str, float]:
-        """What of a range is otherwise than in the file; SI."""
+        """The parts of a range that differ from the file; SI."""
         assert self._study is not None
         factor = next(one for one in self._study.factors if one.name == name)
         unit, declared = unit_of_parameter(factor.path), parameters(self._study.scene)[factor.path]
@@ -187,7 +187,7 @@ def _shown(handle: Any) -> Range:
 
 
 def edits_markdown(study: Study, edits: StudyEdits) -> str:
-    """A table of what is changed: in the file, now."""
+    """A table of the changes: value in the file, value now."""
     paths = {factor.name: factor.path for factor in study.factors}
     rows = []
     for whose, key, before, after in listed_edits(study, edits):
@@ -201,5 +201,5 @@ def edits_markdown(study: Study, edits: StudyEdits) -> str:
 
 
 def number_on_screen(value: float) -> float:
-    """Six digits: what a number box shows."""
+    """``value`` to six digits, as a number box shows it."""
     return float(f"{value:.6g}")

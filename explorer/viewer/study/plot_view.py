@@ -1,6 +1,6 @@
 """One chart at a time, chosen from a list, dark or light as the page is.
 
-The chart is made when it is chosen, or when what it shows has changed. plotly paints it white unless told otherwise.
+The chart is made when it is chosen, or when its content has changed. plotly paints it white unless told otherwise.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ NOTHING = "(nothing yet)"
 class PlotView:
     """List, chart and caption. ``empty`` says what to do while there is nothing to show.
 
-    The chart comes onto the page with the first thing to show: the first one brings plotly.js (4 MB) to every browser.
+    The chart is added to the page with the first content, because it loads plotly.js (4 MB) into every browser.
     """
 
     def __init__(self, server: viser.ViserServer, label: str, empty: str, post: Post, dark: bool = True) -> None:
@@ -59,18 +59,18 @@ class PlotView:
         self._draw()
 
     def offer(self, plots: Plots, version: Hashable) -> None:
-        """The charts that there are now; ``version`` changes when what they show does. Inside ``server.atomic()``."""
+        """Offer the present charts; ``version`` changes when their content does. Call it inside ``server.atomic()``."""
         if version == self._version:
             return
         self._version, self._plots = version, plots
         titles = tuple(plots) or (NOTHING,)
         if tuple(self._choice.options) != titles:
-            # viser takes the first option where the present one is not among the new ones.
+            # viser takes the first option if the present one is not among the new ones.
             self._choice.options = titles
         self._draw()
 
     def show_anew(self, titles: Sequence[str]) -> None:
-        """Draw again what shows something else now: the chosen chart if it is one of ``titles``, else the first."""
+        """Draw changed charts again: the chosen chart if it is one of ``titles``, else the first."""
         if self._choice.value not in titles:
             self._choice.value = titles[0]  # type: ignore[misc]
         self._shown = None
