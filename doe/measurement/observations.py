@@ -85,15 +85,18 @@ def read_observations(
                 observations.append(observation)
             else:
                 ignored.append(f"{name}: {observable} from {origin}: one replicate and no [uncertainty]")
+    taken = {observation.observable for observation in observations}
     for observable, (x, values) in stated.items():
-        if observable not in piles | photographs | profile:
-            observation = _observation(observable, x, values, uncertainty, "table")
-            if not _has_spread(observation):
-                raise MeasurementError(
-                    f"{table_path}: {observable}: one replicate has no scatter; allowed: two or more replicates, or "
-                    f"{observable} in [uncertainty]"
-                )
+        if observable in taken:
+            continue
+        observation = _observation(observable, x, values, uncertainty, "table")
+        if _has_spread(observation):
             observations.append(observation)
+        elif observable not in piles | photographs | profile:
+            raise MeasurementError(
+                f"{table_path}: {observable}: one replicate has no scatter; allowed: two or more replicates, or "
+                f"{observable} in [uncertainty]"
+            )
     ordered = tuple(sorted(observations, key=lambda observation: observation.observable))
     return replicates, ordered, tuple(checks), tuple(ignored)
 

@@ -375,7 +375,7 @@ def _proposal(measurement: Measurement, proposed: str | None) -> str:
     listed = ", ".join(f"{name} {count}" for name, count in numbers.items())
     if proposed is None:
         held = ", ".join(one.name for one in measurement.holdout) or "none"
-        return f"roles: held out: {held}, as it was asked for; numbers with a spread: {listed}"
+        return f"roles: held out: {held}, as before or as asked for; numbers with a spread: {listed}"
     return (
         f"roles: proposed to hold out: {proposed}, since it tells no more than any other (numbers with a spread: "
         f"{listed}) and what is held out is predicted, never fitted; change role in {FILE} to choose otherwise"

@@ -5,7 +5,7 @@ import pytest
 
 from doe.errors import MeasurementError
 from doe.measurement import load_measurement
-from tests.doe.measurement.folders import MEASUREMENT, changed, write
+from tests.doe.measurement.folders import MEASUREMENT, changed, write, write_pile
 from tests.solver.photograph.rendered import Look, photograph, save, solid_cover
 
 LOOK = Look(width=500)
@@ -42,6 +42,20 @@ def test_tables_state_replicate_azimuth_and_scale(tmp_path):
     np.testing.assert_allclose(slow.offered["angle_of_repose_deg@90"].values, [30.5, np.nan, 27.5], atol=0.5)
     np.testing.assert_allclose(slow.offered["apex_height_m"].values, [0.045, np.nan, 0.045], atol=0.001)
     assert slow.offered["angle_of_repose_deg@0"].origin == "table"
+
+
+def test_where_one_picture_has_no_scatter_the_table_is_taken(tmp_path):
+    measurement = load_measurement(pictured(tmp_path, '["a.png"]'))
+    angle = measurement.conditions[0].offered["angle_of_repose_deg@0"]
+    assert (angle.origin, angle.values.tolist()) == ("table", [20.0, 30.0])
+    assert measurement.ignored == ("slow: angle_of_repose_deg@0 from photographs: one replicate and no [uncertainty]",)
+
+
+def test_a_gap_between_piles_is_named_whatever_pictures_there_are(tmp_path):
+    folder = pictured(tmp_path, '[{ file = "a.png", replicate = 5 }]')
+    write_pile(folder / "piles" / "slow_4.npz")
+    with pytest.raises(MeasurementError, match=r"slow_4\.npz: replicate 3 of 4 is missing"):
+        load_measurement(folder)
 
 
 def test_a_picture_without_a_pile_is_listed_with_its_reason(tmp_path):

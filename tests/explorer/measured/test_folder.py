@@ -145,7 +145,7 @@ def test_a_second_condition_is_added_and_the_one_that_tells_least_held_out(mater
     # A third one leaves roles as they are.
     text = new(folder, "--condition", "high", "--angles", "22,23", "--set", "rig.outlet_height=0.09")
     assert [one.role for one in load_measurement(folder).conditions] == ["holdout", "fit", "fit"]
-    assert "held out: slow, as it was asked for" in text
+    assert "held out: slow, as before or as asked for" in text
     assert "has the set-up of" not in text
     text = new(folder, "--condition", "twin", "--angles", "22,23", "--role", "holdout")
     assert "twin has the set-up of slow" in text
