@@ -16,9 +16,9 @@ If each replicate is the mean of k pours, its variance is s^2/k, and k s_meas^2 
 gives no estimate of its scatter; its variance is then that of the simulated pours of the final model plus that of the
 instrument, s_after^2/k + u^2 with the stated uncertainty u.
 
-An answer is tested on the summary that deviates most from the final model, over all held-out conditions,
+An answer is tested on the summary of the smallest p over all held-out conditions, where
 
-    |t| = max |measured − poured| / (s √(1/(k r) + 1/m))
+    |t| = |measured − poured| / (s √(1/(k r) + 1/m))
 
 with r measured replicates, each the mean of k pours, and m fresh pours, s pooled over both and f = r + m − 2 degrees of
 freedom. For a single replicate s is that of the fresh pours alone, the denominator is √(s² (1/k + 1/m) + u²), and the

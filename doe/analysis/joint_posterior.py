@@ -80,8 +80,8 @@ class JointPosterior(Record):
 def joint_posterior(models: Sequence[Surface], targets: Sequence[Target]) -> JointPosterior | None:
     """Return the posterior of the factors of ``models``, one per target; None with more than four factors.
 
-    If not even the best setting comes within 30 standard errors of the targets, the posterior is the neighbourhood of
-    that setting, and ``misfit`` shows that it is not an answer.
+    Where no setting comes near the targets, the posterior is the neighbourhood of the nearest setting, and ``misfit``
+    shows that it is not an answer.
     """
     k = len(models[0].names)
     if k not in CELLS:

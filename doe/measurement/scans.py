@@ -4,7 +4,7 @@
     .xyz .txt .csv      points x, y, z in the first three columns, with or without a header; a comma is a decimal sign
                         where semicolons, tabs or blanks separate the cells
     .npz                height (n, m), x (n,), y (m,); NaN where nothing was seen
-    .tif .tiff          16 bit; one column per x, one row per y, from +y downward; 0 where nothing was seen
+    .tif .tiff          16 or 32 bit; one column per x, one row per y, from +y downward; 0 where nothing was seen
 
 ``[condition.scan]`` of ``measurement.toml`` states what the files do not (:class:`ScanSettings`).
 

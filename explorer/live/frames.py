@@ -159,7 +159,7 @@ class SlotReader(Generic[T]):
         """The newest, or None before the first one.
 
         It is the same object until something new is published, and also if the writer overtook every attempt
-        to copy (it would have to publish twice within a copy of some 10 µs, five times in a row).
+        to copy (it would have to publish within a copy of some 10 µs, five times in a row).
         """
         for _ in range(READ_ATTEMPTS):
             counter = int(self._buffer["counter"][0])

@@ -6,7 +6,7 @@ grains and on where they happen to lie. A heap
     is at least ``LEAST_HEIGHT`` grain thicknesses high at its apex, the height that the flanks' windows refer to, and
     has the tops of at least ``LEAST_GRAINS`` grains in the window of a flank's line, median over views and flanks.
 
-The thickness is a grain's smallest outer dimension, averaged by mass over the pile (``footprint.grain_thickness``):
+The thickness is a grain's smallest outer dimension, averaged by mass over the pile (``surface.grain_thickness``):
 flat grains lie on their broad side, so that two layers are two thicknesses high. Two grains determine a line, whatever
 the rest of the heap looks like; only from the third on is there something to fit. At 2.5 thicknesses the window, from
 20 % to 80 % of the height, is 1.5 thicknesses high, which is 3.5 along a slope of 25° and less than 3 from 30° on. For

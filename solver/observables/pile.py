@@ -16,7 +16,7 @@ hence
                             min over H, R of ∫ (h(r) - H max(0, 1 - r/R))² r dr
 
 Bias [°] on made-up piles of 80 seed-sized bodies in a cone of 25° (60 piles each, 95 % interval;
-seeds_in_cone in the tests), for three rules on how much of a body must lie inside the cone: its centre
+``made_up.seeds_in_cone``), for three rules on how much of a body must lie inside the cone: its centre
 (homogeneous mass, bodies stick out), half of it, all of it:
 
     silhouette flank fit    -5.4 ± 0.6    -1.6 ± 0.5     -0.4 ± 0.4

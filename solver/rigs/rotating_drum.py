@@ -139,7 +139,7 @@ class RotatingDrum(PourRig):
         return EVERYWHERE
 
     def actions(self) -> tuple[Action, ...]:
-        """Shell, and end plates if they are fixed to it, turn from the start of the run."""
+        """Shell, and end plates if they are fixed to it, turn from when the rig begins to act."""
         turn = (0.0, self.angular_speed, 0.0)
         turning = self.surface_names if self.end_plates == "turning" else ("shell",)
         return tuple(Move(0.0, self.surface_names.index(name), angular_velocity=turn) for name in turning)
