@@ -9,7 +9,6 @@ uncertainty of the fit, of the regression and of the axis of a scan.
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -116,7 +115,7 @@ def checked_by_bodies(
     if verdict.kind == UNEXPLAINED:
         return ()
     (answer,) = verdict.names or (BASE,)
-    odds = {**found.effects, BASE: max(found.nothing, sys.float_info.min)}
+    odds = {**found.effects, BASE: found.nothing}
     others = [label for label, p in odds.items() if label != answer and (p >= MISTAKEN or label == BASE)]
     weights = {label: odds[label] for label in (answer, *sorted(others, key=lambda one: -odds[one]))}
     acts = {label: acting_in(found, label) for label in weights}

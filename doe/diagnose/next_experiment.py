@@ -31,6 +31,8 @@ DRAWS = 400
 """Simulated data sets per answer."""
 PLANNED, GIVEN_UP = (6, 12, 24), 0.05
 """Numbers of pours that may be asked of a laboratory, and the loss of chance accepted for fewer."""
+LEAST_WEIGHT, LARGEST_LOG = 1e-300, 700.0
+"""Of an answer, and of odds, so that both stay finite."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,8 @@ def chance_of_an_answer(
     Answers outside ``weights``, for which nothing was poured, fare like the wrong ones among them; none is ever found.
     """
     names, rng = tuple(weights), np.random.default_rng(seed)
-    prior = np.array(list(weights.values()))
+    # A strong effect leaves nothing of "nothing missing"; it is still what the others fare like.
+    prior = np.maximum(list(weights.values()), LEAST_WEIGHT)
     pour = np.eye(len(item.predictions[names[0]].mean))
     factors = [np.linalg.cholesky(pour / replicates + item.predictions[name].covariance) for name in names]
     chance = 0.0
@@ -94,7 +97,7 @@ def chance_of_an_answer(
             white = np.linalg.solve(factors[j], (drawn - item.predictions[other].mean).T)
             log_likelihood = -np.log(np.diag(factors[j])).sum() - 0.5 * (white**2).sum(axis=0)
             logs.append(np.log(prior[j]) + TEMPERATURE * log_likelihood)
-        odds = np.exp(np.stack(logs) - logs[k])
+        odds = np.exp(np.minimum(np.stack(logs) - logs[k], LARGEST_LOG))
         without = np.array([not holds(other, name) for other in names])
         right, wrong = odds[~without].sum(axis=0), odds[without].sum(axis=0)
         if without.any():

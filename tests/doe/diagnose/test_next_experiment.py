@@ -54,6 +54,12 @@ def test_a_likely_answer_needs_less():
     assert near > chance_of_an_answer(item(1.0), WEIGHTS, 6)
 
 
+def test_an_answer_of_no_weight_at_all_leaves_the_chance_as_it_is():
+    gone, hardly = (chance_of_an_answer(item(2.0), {"a": 0.9, "b": p}, 6) for p in (0.0, 1e-12))
+    assert gone == hardly > 0.8
+    assert fewest_pours([item(2.0)], {"a": 0.9, "b": 0.0})[1][0].chance > 0.8
+
+
 def test_nothing_missing_is_an_answer_with_less():
     s = math.sqrt(6.0)
     named, nothing = (
