@@ -1,4 +1,4 @@
-"""What a virtual twin returns, and which tests have one; nothing here loads the solver."""
+"""The result of a virtual twin, and which tests have one; nothing here loads the solver."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from doe.record import Record
 from explorer.errors import CommandError
 
 CLOSES = 0.01
-"""Largest relative deviation of a round trip that closes."""
+"""Largest relative deviation at which a round trip closes."""
 RIGS = {
     "inclined_plane": "inclined_plane",
     "drop": "drop_plate_45",
@@ -18,13 +18,13 @@ RIGS = {
     "compression": "compression",
     "shear": "compression",
 }
-"""Rig of each test that has a twin; a rebound is on the plane while it is level."""
+"""Rig of each test that has a twin; a rebound is run on the plane while it is level."""
 LIKE = {
     "bulk_density": "explorer simulate lifting_cylinder (bulk_density_kg_m3, solid_fraction of the pile)",
     "drum": "explorer simulate rotating_drum (dynamic_angle_deg)",
     "draw_down": "explorer simulate draw_down_box (draw_down_angle_deg, angle_of_repose_deg@0, discharge)",
 }
-"""Command that simulates the like of a test without a twin, with a whole material in place of what the test gave."""
+"""For a test without a twin: the command that simulates a similar test, with a whole material instead of its result."""
 
 
 @dataclass(frozen=True)

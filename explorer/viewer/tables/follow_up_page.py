@@ -104,7 +104,7 @@ def number_rows(tables: FollowUpTables) -> list[dict[str, str]]:
 
 
 def filled_numbers(tables: FollowUpTables, sent: Sequence[object]) -> list[AskedNumber]:
-    """The numbers of ``tables`` with the values that a browser ``sent``. Raises CommandError for another table's rows."""
+    """The numbers of ``tables`` with the values that a browser ``sent``. CommandError for rows of another table."""
     return [
         replace(
             row,

@@ -60,7 +60,7 @@ class Clicks:
         self.points[what] = [point] if len(before) == 2 else [*before, point]
 
     def marks(self, length_mm: float | None) -> Marks:
-        """What is marked by two points each. Raises CommandError where one point is missing, or nothing is marked."""
+        """The marks that two points each define. Raises CommandError if one of two points is missing."""
         for what, points in self.points.items():
             if len(points) == 1:
                 raise CommandError(f"{what.lower()}: one point is marked; click the other one")

@@ -136,7 +136,7 @@ def filled_sheet(sheet: Sheet, rows: Sequence[Mapping[str, object]]) -> tuple[st
         [header, *table]
     )
     stem = KEPT_NAME.sub("", sheet.path.stem)
-    content = text.getvalue().encode("utf-8-sig")  # spreadsheets recognise UTF-8 by this mark
+    content = text.getvalue().encode("utf-8-sig")  # spreadsheets recognise the encoding by its mark
     _check(content, [tuple(row) for row in table])
     return f"{stem}{SAVED_AS}.csv", content
 
