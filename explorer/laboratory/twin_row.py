@@ -29,10 +29,10 @@ LIKE = {
 
 @dataclass(frozen=True)
 class TwinRow(Record):
-    """One quantity of one twin, SI; None where there is none.
+    """One quantity of one twin, SI; None for a missing value.
 
-    error: simulated over what was put in, less one; over what was measured where nothing was put in. closes: whether
-    the round trip does, None for a row that shows a bias.
+    error: simulated over put_in, minus one; over measured if nothing was put in. closes: whether the round trip closes;
+    None for a row that shows a bias.
     """
 
     of: tuple[str, ...]

@@ -69,7 +69,7 @@ def load_scene(source: str, material: str | None = None) -> Scene:
 
 
 def named_scene(source: str, material: str | None = None) -> tuple[Scene, str]:
-    """The scene from :func:`load_scene`; for a calibration's folder, scene and caution from :func:`calibrated_scene`."""
+    """The scene from :func:`load_scene`, or for a calibration's folder :func:`calibrated_scene` with its caution."""
     if material is None and is_calibration(source):
         return calibrated_scene(source)
     return load_scene(source, material), ""

@@ -132,7 +132,7 @@ class StudyPanel(Panel):
         self._show_board()
 
     def _expected(self, state: str, present: QueuedStudy | None) -> str:
-        """Expected duration of the running study or the chosen profile; updated for another one and when a study ends."""
+        """Duration of the running study or the chosen profile; updated for another one and when a study ends."""
         study = self._loaded if present is None else present.study
         name = str(self._profile.value) if present is None else present.profile
         if (asked := (name, state, id(study))) != self._asked:
