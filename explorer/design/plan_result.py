@@ -117,7 +117,7 @@ def blocks(plan: RunPlan) -> list[str]:
 
 
 def planned_order(plan: RunPlan, file: FactorsFile) -> Order | None:
-    """The model that the runs support besides their blocks; None if even a linear model leaves nothing for the error."""
+    """The model that the runs support besides their blocks; None if even a linear one leaves nothing for the error."""
     letters = factor_letters(plan.coded.shape[1])
     runs, values = plan.coded[plan.sequence[:, 0]], np.zeros((len(plan.sequence), 1))
     if _many_names(file):

@@ -179,7 +179,7 @@ def _seeds(first: int, runs: int, finished: Array) -> npt.NDArray[np.int64]:
 
 
 def _require_parts(file: FactorsFile) -> None:
-    """Require that low … high is equally wide for all parts: a part is at its high when all others are at their lows."""
+    """Require equal widths low … high of all parts: a part is at its high when all others are at their lows."""
     rooms = [factor.high - factor.low for factor in file.factors]
     named = [factor.name for factor in file.factors if factor.levels]
     if named:
@@ -240,7 +240,7 @@ def sheet_content(plan: RunPlan, file: FactorsFile, workbook: bool, decimal_comm
 
 
 def sheet_text(plan: RunPlan, file: FactorsFile, decimal_comma: bool = False) -> str:
-    """The empty sheet as CSV; with decimal commas, semicolons separate the cells, as in local spreadsheets."""
+    """The empty sheet as CSV; with decimal commas, semicolons separate the cells, as such spreadsheets expect."""
     comments, rows = _sheet(plan, file)
     stream = io.StringIO()
     stream.writelines(f"{line}\n" for line in comments)

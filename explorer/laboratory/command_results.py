@@ -103,7 +103,7 @@ class PhotographReading:
     """A file, or the name of a shipped photograph."""
     ruler: Ruler
     checkerboard: str | None
-    """File with a picture of a checkerboard by the same camera; None: the lens is estimated from the base line."""
+    """File with a picture of a checkerboard by the same camera; None: the base line determines the lens."""
     order: MeasureOrder
     measured: MeasuredPhotographs
     marks: Marks = UNMARKED

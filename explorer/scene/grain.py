@@ -63,7 +63,7 @@ def grain_scene(grain: Grain) -> Scene:
 
 
 def write_grain(folder: Path, grain: Grain) -> Path:
-    """Write ``NAME.toml`` into ``folder``; CommandError if it exists or the name is not allowed."""
+    """Write ``NAME.toml`` into ``folder``. Raises CommandError if the file exists or the name is not allowed."""
     path = new_path(folder, grain.name)
     lengths = " × ".join(f"{1e3 * length:.4g}" for length in grain.lengths)
     heading = f"{grain.name}: {grain.shape}, {lengths} mm. SI; what nobody has measured yet stands under assumed."

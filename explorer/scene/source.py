@@ -74,7 +74,7 @@ def _named(material: str) -> str:
 def command_line(source: SceneSource, scene: Scene, seed: int) -> str:
     """``explorer simulate …`` that pours ``scene`` with ``seed``, quoted for a shell.
 
-    Raises CommandError where no settings lead from the source to ``scene``, such as other bodies or materials.
+    Raises CommandError if no settings lead from the source to ``scene``, for example if bodies or materials differ.
     """
     words = [*PROGRAM, *source.arguments]
     for setting in settings(source, scene):
@@ -83,7 +83,7 @@ def command_line(source: SceneSource, scene: Scene, seed: int) -> str:
 
 
 def settings(source: SceneSource, scene: Scene) -> tuple[str, ...]:
-    """Texts ``path=value`` that make the source's scene into exactly ``scene``; CommandError where there are none."""
+    """Texts ``path=value`` that turn the source's scene into exactly ``scene``; CommandError if there are none."""
     if not source.arguments:
         raise CommandError(
             "this scene does not come from a file that a command line can name; save the scene file instead"
@@ -101,7 +101,7 @@ def settings(source: SceneSource, scene: Scene) -> tuple[str, ...]:
 
 
 def setting_text(change: Difference) -> str:
-    """``path=value``, in the unit of the screen where that gives back every bit, otherwise in SI with all digits."""
+    """``path=value``, in the unit on the screen if that reproduces every bit, otherwise in SI with all digits."""
     if isinstance(change.now, str):
         return f"{change.path}={change.now}"
     number, unit = float(change.now), entry_unit(change.unit)

@@ -94,7 +94,7 @@ def study_text(path: Path, material: str, scene: Scene) -> str:
 
 
 def _rig_words(scene: Scene) -> dict[str, str]:
-    """The parts of a study that depend on its rig: set-up, assumptions, declared change and scan, poured masses [kg]."""
+    """Texts of a study that depend on its rig: set-up, assumptions, declared change and scan, poured masses [kg]."""
     words = {"QUICK_MASS": "0.012", "MASS": "0.030"}
     template = "study_in_funnel.toml"
     if isinstance(scene.rig, LiftingCylinder):
