@@ -61,7 +61,7 @@ class FactorsTable(TomlTable):
 
 @dataclass(frozen=True)
 class DesignFactor(Record):
-    """One factor: low, high and reference in ``unit``; one that is no number has ``levels``, and low −1 and high +1."""
+    """One factor: low, high and reference in ``unit``; a factor of names has ``levels``, and low −1 and high +1."""
 
     name: str
     low: float
@@ -88,7 +88,7 @@ class DesignFactor(Record):
 
 @dataclass(frozen=True)
 class FactorsFile(Record):
-    """Factors with what else the file says about the runs; None where it says nothing."""
+    """Factors, and what else the file says about the runs; None if it says nothing."""
 
     title: str
     factors: tuple[DesignFactor, ...]

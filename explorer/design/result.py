@@ -62,9 +62,9 @@ class DrawnEffects:
 
 @dataclass(frozen=True, kw_only=True)
 class DesignResult(Document):
-    """``design``: kind of the design, "" where the sheet does not say. ``coded``: its levels, shape (rows, k).
+    """``design``: kind of the design, "" if the sheet does not state it. ``coded``: its levels, shape (rows, k).
 
-    ``labels``: what the valid runs are called, in the order of the model's runs. ``target``: value that was asked for.
+    ``labels``: labels of the valid runs, in the order of the model's runs. ``target``: the requested value.
     """
 
     SCHEMA: ClassVar[int] = 2
