@@ -30,7 +30,7 @@ Table = dict[str, Any]
 
 SIZES = ("size_distribution", "size_spread")
 SCATTER = "log_normal"
-"""Distribution of a measured spread, which acts only with a distribution; as for diameters in a material file."""
+"""Distribution of a measured spread, which has no effect without one; as for measured diameters in a material file."""
 ELASTIC = ("youngs_modulus", "shear_modulus", "poisson_ratio")
 STARTER = "the starter material"
 

@@ -36,7 +36,7 @@ from solver.single_body.bench import UPRIGHT, ball
 from solver.single_body.inclined_plane import onset, rebound_height
 
 TILT_RATE = 5.0
-"""Tilt rate of the plane [°/s]; changes the angle by less than a hundredth of a degree from the rig's own 1 °/s."""
+"""Tilt rate of the plane [°/s]; the angle is within a hundredth of a degree of that at the rig's own 1 °/s."""
 DROP_HEIGHT = 0.2
 """Drop height of a twin whose readings state none [m]."""
 LOWEST, HIGHEST = 0.05, 1.0

@@ -45,7 +45,7 @@ ROWS = "the rows of the follow-up"
 
 
 def follow_up_page(folder: Callable[[], Path | None], post: Post) -> TablePage:
-    """The page for filling in the follow-up in ``folder``; None if the answer that is shown asks for no follow-up."""
+    """The page for filling in the follow-up in ``folder()``, which is None if the answer shown asks for none."""
     return TablePage("follow-up", TITLE, lambda: _build(folder, post))
 
 
