@@ -1,1 +1,1 @@
-"""Designs of one's own: a factors file becomes a sheet of runs, a filled sheet becomes an analysis."""
+"""Designs by users: a factors file becomes a sheet of runs, a filled sheet becomes an analysis."""

@@ -1,4 +1,4 @@
-"""A filled sheet from its order to its analysis, and to files."""
+"""From the order to analyse a filled sheet to the analysis and its files."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ from solver.assets import asset_path
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 RARE = 0.01
-"""p below which an order of residuals is worth a note."""
+"""p below which a pattern in the order of the residuals is worth a note."""
 SAME = 1e-9
-"""Coded levels that differ by less are one."""
+"""Coded levels that differ by less count as one."""
 FAR = 2.5
-"""Half-widths from the middle of a factor's range beyond which a level is likely a slip: the star points of rotatable
-central composite designs of up to five factors stand 2^(5/4) = 2.4 out (Box and Hunter 1957, Ann. Math. Stat. 28,
+"""Half-widths from the middle of a factor's range beyond which a level is probably a slip: the star points of rotatable
+central composite designs of up to five factors are 2^(5/4) = 2.4 away (Box and Hunter 1957, Ann. Math. Stat. 28,
 195)."""
 
 
@@ -63,7 +63,7 @@ class AnalyseOrder:
     block: str = ""
     """Column of the block in which each run was made."""
     random: str = ""
-    """Column of the group, drawn at random, in which each run was made."""
+    """Column of the random group in which each run was made."""
     reduction: Reduction | None = None
     surrogate: Surrogate | None = None
     out: Path | None = field(default=None)
@@ -141,7 +141,7 @@ def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
 
 
 def _refuse_surrogate(runs: Runs, order: AnalyseOrder) -> None:
-    """A Gaussian process has no groups, and no distance between three names."""
+    """Refuse what a Gaussian process cannot handle: groups, and distances between three names."""
     for option, given in {"--block": runs.blocks, "--random": runs.groups}.items():
         if given is not None:
             raise CommandError(f"--surrogate {order.surrogate}: cannot take groups of runs; leave out {option}")
@@ -173,21 +173,21 @@ def _result(runs: Runs, order: AnalyseOrder, analysis: DesignAnalysis) -> Design
 
 
 def _whole(runs: Runs, region: Region) -> bool:
-    """Whether all factors are the parts of a mixture: they add up to one number in every run with a result, and nothing
-    else ties them.
+    """Whether all factors are the parts of a mixture: they have the same sum in every run with a result, and there is
+    no other relation between them.
     """
     valid = ~np.isnan(runs.responses).all(axis=1)
     levels = region.natural(runs.coded[valid])
     if len(runs.factors) < 2 or any(factor.levels for factor in runs.factors) or len(levels) <= len(runs.factors):
         return False
     if (levels < -SAME).any():
-        return False  # what can be below zero is no amount
+        return False  # an amount cannot be below zero
     one_sum = bool(np.ptp(levels.sum(axis=1)) < SAME * np.abs(levels).max())
     return one_sum and bool(np.linalg.matrix_rank(levels - levels.mean(axis=0), tol=1e-6) == len(runs.factors) - 1)
 
 
 def _mixture(runs: Runs, region: Region, order: AnalyseOrder) -> DesignAnalysis:
-    """Scheffé's polynomial of a mixture; raises CommandError for what is not for one."""
+    """Scheffé's polynomial of a mixture; raises CommandError for options that do not apply to mixtures."""
     asked = {
         "--target": order.target is not None,
         "--terms": order.terms,
@@ -215,7 +215,7 @@ def _mixture(runs: Runs, region: Region, order: AnalyseOrder) -> DesignAnalysis:
 
 
 def _elementary(runs: Runs, region: Region, order: AnalyseOrder) -> DesignAnalysis:
-    """The elementary effects of a Morris design; a model of the same runs has to be asked for."""
+    """The elementary effects of a Morris design; a model of the same runs has to be requested."""
     try:
         found = elementary_effects(runs.coded, runs.responses, region.names, runs.others)
     except StatisticsError as error:
@@ -225,7 +225,7 @@ def _elementary(runs: Runs, region: Region, order: AnalyseOrder) -> DesignAnalys
 
 
 def _random(runs: Runs, region: Region, order: AnalyseOrder, groups: Blocks) -> DesignAnalysis:
-    """The model with groups that are drawn at random; raises CommandError for what is not for one."""
+    """The model with random groups; raises CommandError for options that do not apply to it."""
     for option, given in {"--target": order.target is not None, "--reduce": order.reduction}.items():
         if given:
             raise CommandError(f"{option}: not allowed with --random {order.random}; allowed: --block {order.random}")
@@ -246,7 +246,7 @@ def _random(runs: Runs, region: Region, order: AnalyseOrder, groups: Blocks) -> 
 
 
 def _named(runs: Runs, region: Region, order: AnalyseOrder, target: ResponseTarget | None) -> DesignAnalysis:
-    """The model of factors that are names, beside those that are numbers."""
+    """The model of factors with named levels, together with numeric factors."""
     try:
         found = fit_named(
             runs.coded,
@@ -272,7 +272,7 @@ def _named(runs: Runs, region: Region, order: AnalyseOrder, target: ResponseTarg
 
 
 def _refuse_dependent(runs: Runs, region: Region, sheet: str) -> None:
-    """Raise CommandError where the levels of the valid runs do not tell the factors apart, and name those."""
+    """Raise CommandError, naming the factors, if the levels of the valid runs do not tell factors apart."""
     valid = ~np.isnan(runs.responses).all(axis=1)
     levels = region.natural(runs.coded[valid])
     names = [factor.name for factor in runs.factors]
@@ -284,7 +284,7 @@ def _refuse_dependent(runs: Runs, region: Region, sheet: str) -> None:
                 f"estimated; leave it out with --only {','.join(one for one in names if one != name)}"
             )
     if int(valid.sum()) <= len(names):
-        return  # too few runs for anything, which is told where the model is fitted
+        return  # too few runs for anything, which fitting the model will report
     centred = (runs.coded[valid] - runs.coded[valid].mean(axis=0)) / spread
     *_, singular, vectors = np.linalg.svd(centred, full_matrices=False)
     if singular[-1] > SAME * singular[0]:
@@ -301,7 +301,7 @@ def _refuse_dependent(runs: Runs, region: Region, sheet: str) -> None:
 
 
 def _run_notes(runs: Runs, region: Region, found: DesignAnalysis) -> list[str]:
-    """What single runs ask for: levels far outside a factor's range, and runs without which there is no model."""
+    """Notes about single runs: levels far outside a factor's range, and runs without which there is no model."""
     row, replicate = np.nonzero(~np.isnan(runs.responses))
     labels, notes = _labels(runs), []
     for factor in runs.factors:
@@ -338,7 +338,7 @@ def _run_notes(runs: Runs, region: Region, found: DesignAnalysis) -> list[str]:
 
 
 def _drift(place: IntArray, residual: Array) -> list[str]:
-    """A note where the residuals, in the order of the runs, change their sign too rarely for chance.
+    """A note if the residuals, in the order of the runs, change sign too rarely to be chance.
 
     R runs of one sign among n₊ positive and n₋ negative residuals; P(R ≤ r) counts arrangements (Wald and Wolfowitz
     1940, Ann. Math. Stat. 11:147).
@@ -369,7 +369,7 @@ def _drift(place: IntArray, residual: Array) -> list[str]:
 
 
 def _order(runs: Runs, order: AnalyseOrder) -> Order | None:
-    """The order of the model; a design for main effects only was made for the linear one."""
+    """The order of the model; a design for main effects only is meant for the linear model."""
     if order.order is not None:
         return next(one for one in ORDERS if one == order.order)
     design = DESIGNS.get(runs.design)
@@ -415,14 +415,14 @@ def _factors(runs: Runs) -> tuple[SheetFactor, ...]:
 
 
 def _response_path(runs: Runs) -> str:
-    """Name and unit; an angle without a stated unit is one by its name."""
+    """Name and unit; a response without a unit is an angle if its name says so."""
     if not runs.unit and runs.response.endswith("_deg"):
         return own_path(runs.response.removesuffix("_deg"), "°")
     return own_path(runs.response, {"1": "", "deg": "°"}.get(runs.unit, runs.unit))
 
 
 def _labels(runs: Runs) -> tuple[str, ...]:
-    """What the valid runs are called, in the order of the surface's runs."""
+    """Labels of the valid runs, in the order of the surface's runs."""
     row, replicate = np.nonzero(~np.isnan(runs.responses))
     return tuple(runs.labels[i][j] for i, j in zip(row, replicate, strict=True))
 
@@ -436,7 +436,7 @@ def _only_response(path: Path, responses: list[str]) -> str:
 
 
 def _command(order: AnalyseOrder) -> tuple[str, ...]:
-    """The order as words of a command line, without where it was written to."""
+    """The order as words of a command line, without the place that the results were written to."""
     words = ["explorer", "analyse", order.sheet]
     options: list[tuple[str, Any, Callable[[Any], str]]] = [
         ("--response", order.response, str),

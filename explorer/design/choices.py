@@ -1,6 +1,6 @@
-"""What the command line of a design offers, and the page with it: axial points, orders of the model, limits of numbers.
+"""What the command line of a design and the page offer: axial points, orders of the model, limits of numbers.
 
-In a file without NumPy, so that `--help` does not wait for it.
+This file does without NumPy, so that `--help` does not wait for its import.
 """
 
 from collections.abc import Mapping
@@ -9,9 +9,9 @@ from enum import StrEnum
 FEWEST: Mapping[str, int] = {
     "runs": 2, "replicates": 1, "centre": 0, "blocks": 2, "fraction": 0, "lattice": 1, "seed": 0,
 }  # fmt: skip
-"""Field of a ``DesignOrder`` → its least whole number."""
+"""Field of a ``DesignOrder`` → its smallest whole number."""
 MOST: Mapping[str, int] = {"replicates": 1000, "centre": 1000, "blocks": 512, "lattice": 50}
-"""Field → its largest, where that does not depend on the design."""
+"""Field → its largest whole number, if that does not depend on the design."""
 
 
 class Alpha(StrEnum):

@@ -23,7 +23,7 @@ UNIT = re.compile(r"[^\s=@|,;\[\]\"'`<>][^|,;\[\]\"`<>\n]{0,19}")
 LEVEL = re.compile(r"[^\s=@|,;\[\]\"'`<>][^|,;\[\]\"`<>\n]{0,39}")
 RESPONSE = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\]]*)\]\s*")
 EXCLUDED = "excluded"
-"""Column of the sheet that says why a run is left out of the analysis; empty where it is not."""
+"""Column of the sheet that says why a run is left out of the analysis; empty if it is not left out."""
 RESERVED = ("row", "replicate", "run", "seed", EXCLUDED)
 """Columns of the sheet that are not factors."""
 MOST_FACTORS = 47
@@ -61,7 +61,7 @@ class FactorsTable(TomlTable):
 
 @dataclass(frozen=True)
 class DesignFactor(Record):
-    """One factor: low, high and reference in ``unit``; one that is no number has ``levels``, and low −1 and high +1."""
+    """One factor: low, high and reference in ``unit``; a factor of names has ``levels``, and low −1 and high +1."""
 
     name: str
     low: float
@@ -71,7 +71,7 @@ class DesignFactor(Record):
     levels: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON types; levels only where there are any."""
+        """As JSON types; levels only if there are any."""
         found = super().to_dict()
         return found if self.levels else {name: value for name, value in found.items() if name != "levels"}
 
@@ -88,7 +88,7 @@ class DesignFactor(Record):
 
 @dataclass(frozen=True)
 class FactorsFile(Record):
-    """Factors with what else the file says about the runs; None where it says nothing."""
+    """Factors, and what else the file says about the runs; None if it says nothing."""
 
     title: str
     factors: tuple[DesignFactor, ...]
@@ -107,13 +107,13 @@ class FactorsFile(Record):
 
 
 def region_of(factors: tuple[DesignFactor, ...]) -> Region:
-    """The box low … high; factors go by their letters A, B, … there."""
+    """The box low … high; its factors are named by their letters A, B, …"""
     low, high = (np.array([getattr(factor, end) for factor in factors]) for end in ("low", "high"))
     return Region(factor_letters(len(factors)), (low + high) / 2, (high - low) / 2, ())
 
 
 def read_factors(path: Path) -> FactorsFile:
-    """Read a factors file; raises CommandError with one line: file, key, value, what is allowed."""
+    """Read a factors file. Raises CommandError with one line: file, key, value and what is allowed."""
     try:
         table = read_toml(path)
     except ParameterError as error:
@@ -143,7 +143,7 @@ def make_factor(name: str, low: float, high: float, unit: str, reference: float 
 
 
 def make_names(name: str, levels: tuple[str, ...], where: str) -> DesignFactor:
-    """A checked factor of names; raises StudyFileError."""
+    """A checked factor with named levels; raises StudyFileError."""
     checked_name(name, f"{where}.name")
     if len(levels) < 2 or len(set(levels)) < len(levels):
         raise StudyFileError(f"{where}.levels: {list(levels)}; allowed: two or more different names ({name})")
@@ -166,16 +166,16 @@ def is_number(text: str) -> bool:
 
 
 def factor_words(factors: tuple[DesignFactor, ...]) -> dict[str, int]:
-    """The words that a factor goes by, its name or its letter, and its place: one's name is never another's letter."""
+    """Names and letters of the factors → their positions; a letter that is the name of any factor means that factor."""
     names = {factor.name: k for k, factor in enumerate(factors)}
     letters = enumerate(factor_letters(len(factors)))
     return names | {letter: k for k, letter in letters if letter not in names}
 
 
 def coded_constraint(text: str, factors: tuple[DesignFactor, ...]) -> tuple[float, ...]:
-    """A constraint such as "A + 2 B <= 30" in the factors' units as a_1, …, a_k, b of a x <= b in coded ones.
+    """A constraint such as "A + 2 B <= 30" in the factors' units, as a_1, …, a_k, b of a x <= b in coded units.
 
-    Factors go by `factor_words`. Raises CommandError.
+    `factor_words` gives the allowed names of factors. Raises CommandError.
     """
     allowed = "allowed: the form A + 2*B <= 30, with letters or names of factors"
     sides = re.split("<=|>=|≤|≥", text)
@@ -223,7 +223,7 @@ def checked_name(name: str, where: str) -> str:
 
 
 def no_repeats(factors: tuple[DesignFactor, ...], responses: tuple[str, ...]) -> None:
-    """Refuse a name that two columns would have; raises StudyFileError."""
+    """Raise StudyFileError for a name that two columns would share."""
     columns = [*(factor.name for factor in factors), *responses]
     for name in columns:
         if columns.count(name) > 1:

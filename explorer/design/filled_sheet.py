@@ -1,8 +1,8 @@
-"""A filled sheet: read from this program, a spreadsheet that saved it, or any CSV with a factors file; and its runs.
+"""A filled sheet and its runs: as this program wrote it, as a spreadsheet saved it, or any CSV with a factors file.
 
-Cells and numbers as `doe.table_file` reads them. A cell that cannot be read is named by its line in the file (the row
-of a spreadsheet) and its column. The runs of one response have coded levels, replicates side by side, and what each run
-is called.
+`doe.table_file` reads cells and numbers. A message about an unreadable cell names its line in the file (the row of a
+spreadsheet) and its column. The runs of one response have coded levels, replicates side by side, and a label for each
+run.
 """
 
 from __future__ import annotations
@@ -37,20 +37,20 @@ Array = npt.NDArray[np.float64]
 EMPTY_CELLS = ("", "NA", "-", "–")
 MOST_BYTES = 10_000_000
 MOST_SEEDS = 2**53
-"""Whole numbers below are exact in a cell."""
+"""Whole numbers below this are exact in a cell."""
 FLAGS = ("yes", "no", "true", "false", "y", "n", "x")
-"""What other programs write where they ask whether a run is left out, and not why."""
+"""Entries of other programs, which record whether a run is left out, but not why."""
 HEADER_CELL = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<unit>[^\]]*)\])?$")
 WORDS = re.compile(r"[^<>&\"'`\x00-\x1f]{0,60}")
 SNAP = 1e-6
-"""A coded level this near to low, middle or high is that level: what twelve digits and a spreadsheet leave."""
+"""A coded level this close to low, middle or high is that level; covers rounding to twelve digits in a spreadsheet."""
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """A sheet as it stands: cells by line, before one response is chosen. ``lines``: their numbers in the file.
+    """A sheet as read: cells by line, before a response is chosen. ``lines``: the numbers of the lines in the file.
 
-    ``table``: what it was read from.
+    ``table``: the table that the sheet was read from.
     """
 
     path: Path
@@ -63,7 +63,7 @@ class Sheet:
     table: CellTable
 
     def is_words(self, column: str) -> bool:
-        """Whether every filled cell of ``column``, and there are any, is no number."""
+        """Whether ``column`` has filled cells and none of them is a number."""
         filled = [cell for row in self.cells if (cell := row[self.columns[column]]) not in EMPTY_CELLS]
         return bool(filled) and all(math.isnan(self.table.number(cell)) for cell in filled)
 
@@ -73,7 +73,7 @@ class Sheet:
         return [name for name in self.columns if name not in {*(f.name for f in self.factors), *RESERVED}]
 
     def number(self, position: int, column: str) -> float:
-        """A cell as a number, NaN where it is empty; raises CommandError with line and column."""
+        """A cell as a number, NaN if it is empty; raises CommandError with line and column."""
         text = self.cells[position][self.columns[column]]
         if text in EMPTY_CELLS:
             return math.nan
@@ -86,7 +86,7 @@ class Sheet:
         return value
 
     def why_excluded(self, position: int) -> str:
-        """Why a run is left out; empty where it is not. Raises CommandError for a number or a yes."""
+        """Why a run is left out; empty if it is not. Raises CommandError for a number or one of ``FLAGS``."""
         text = self.cells[position][self.columns[EXCLUDED]] if EXCLUDED in self.columns else ""
         if text in EMPTY_CELLS:
             return ""
@@ -98,7 +98,7 @@ class Sheet:
         return text
 
     def level(self, position: int, factor: DesignFactor) -> float:
-        """The level of a factor, for names their coded value; NaN where the cell is empty."""
+        """The level of a factor, coded if it is a name; NaN if the cell is empty."""
         if not factor.levels:
             return self.number(position, factor.name)
         text = self.cells[position][self.columns[factor.name]]
@@ -115,7 +115,7 @@ class Sheet:
 def read_sheet(path: Path, factors: Sequence[DesignFactor] = ()) -> Sheet:
     """Read a sheet; ``factors`` take the place of those that its comments declare.
 
-    Raises CommandError with one line: file, line, column, what is allowed.
+    Raises CommandError with one line: file, line, column and what is allowed.
     """
     table = read_table(path, MOST_BYTES, CommandError)
     design, declared = _declarations(path, table)
@@ -195,13 +195,13 @@ def _columns(path: Path, titles: list[tuple[str, str]]) -> dict[str, int]:
 
 
 def short(text: str) -> str:
-    """``text`` in quotes, with its first 37 characters where it is long."""
+    """``text`` in quotes, cut to its first 37 characters if it is long."""
     return repr(text if len(text) <= 40 else text[:37] + "…")
 
 
 @dataclass(frozen=True)
 class Runs:
-    """One response of a sheet. coded (rows, k); responses, labels (rows, replicates): NaN and "" where missing."""
+    """One response of a sheet. coded (rows, k); responses, labels (rows, replicates): NaN and "" for missing runs."""
 
     design: str
     factors: tuple[DesignFactor, ...]
@@ -212,21 +212,21 @@ class Runs:
     labels: tuple[tuple[str, ...], ...]
     missing: int
     place: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
-    """When each run was made, (rows, replicates): its number in the column "run", else its place in the file."""
+    """Place of each run in time, (rows, replicates): its number in the column "run", else its position in the file."""
     blocks: Blocks | None = None
-    """In which each run was made; None where no column says."""
+    """Block in which each run was made; None if no column states it."""
     groups: Blocks | None = None
-    """The same of groups that are drawn at random."""
+    """The same for random groups."""
     excluded: tuple[tuple[str, str], ...] = ()
-    """What each run with a result that is left out is called, and why it is."""
+    """Label and reason of each run that has a result but is left out."""
     others: Array | None = None
-    """Coded levels of the sheet's factors that are left out, of a Morris design, whose steps they bound."""
+    """Coded levels of omitted factors of a Morris design, which still delimit its steps."""
     grouping: tuple[str, ...] = ()
-    """Columns without a use whose cells repeat, as those of days, batches or operators do."""
+    """Unused columns whose cells repeat, as those for days, batches or operators do."""
 
 
 def runs_of(sheet: Sheet, response: str, only: Sequence[str] = (), block: str = "", random: str = "") -> Runs:
-    """The runs of one response, with all factors or with ``only`` some, and in the blocks and random groups of columns.
+    """The runs of one response, with all factors or ``only`` some; columns ``block`` and ``random`` give their groups.
 
     Raises CommandError as `read_sheet` does.
     """
@@ -294,9 +294,9 @@ class FinishedRuns:
 
 
 def finished_runs(sheet: Sheet, responses: Sequence[str]) -> FinishedRuns:
-    """The runs that have a result in one of the responses.
+    """The runs that have a result in at least one of the responses.
 
-    Raises CommandError as `read_sheet` does, and where no run has one.
+    Raises CommandError as `read_sheet` does, and if no run has a result.
     """
     known = [name for name in responses if name in sheet.columns]
     filled = [
@@ -318,7 +318,7 @@ def finished_runs(sheet: Sheet, responses: Sequence[str]) -> FinishedRuns:
 
 
 def _seed(sheet: Sheet, position: int) -> float:
-    """The seed of a run; NaN where the sheet gives none."""
+    """The seed of a run; NaN if the sheet gives none."""
     seed = sheet.number(position, "seed") if "seed" in sheet.columns else math.nan
     if not math.isnan(seed) and not (0 <= seed < MOST_SEEDS and seed.is_integer()):
         raise CommandError(
@@ -329,7 +329,7 @@ def _seed(sheet: Sheet, position: int) -> float:
 
 
 def _others(sheet: Sheet, kept: Sequence[DesignFactor], positions: npt.NDArray[np.int64]) -> Array | None:
-    """Coded levels at positions of the factors of a Morris design that are not kept; None where there are none."""
+    """Coded levels, at positions, of the factors of a Morris design that are not kept; None if there are none."""
     others = tuple(factor for factor in sheet.factors if factor not in kept)
     if sheet.design != Morris.name or not others:
         return None
@@ -338,7 +338,7 @@ def _others(sheet: Sheet, kept: Sequence[DesignFactor], positions: npt.NDArray[n
 
 
 def _blocks(sheet: Sheet, column: str, rows: Sequence[npt.NDArray[np.int64]], width: int) -> Blocks | None:
-    """In which block each run at the positions of the rows was made, by a column; None for no column."""
+    """The block of each run at the positions in ``rows``, from a column; None without a column."""
     if not column:
         return None
     place = sheet.columns[column]
@@ -356,7 +356,7 @@ def _blocks(sheet: Sheet, column: str, rows: Sequence[npt.NDArray[np.int64]], wi
 
 
 def _check_words(sheet: Sheet, response: str) -> None:
-    """Name and unit of a response go into titles of charts, which read a little HTML."""
+    """Check name and unit of a response: they go into chart titles, which interpret some HTML."""
     for what, text in (("name", response), ("unit", sheet.units.get(response, ""))):
         if not WORDS.fullmatch(text):
             raise CommandError(
@@ -373,7 +373,7 @@ def _kept(sheet: Sheet, only: Sequence[str]) -> tuple[DesignFactor, ...]:
 
 
 def _levels(sheet: Sheet, factors: Sequence[DesignFactor], position: int, needed: bool) -> list[float]:
-    """Levels of a run; an empty one is refused where the run has a response."""
+    """Levels of a run; an empty level is refused if it is ``needed`` because the run has a response."""
     levels = [sheet.level(position, factor) for factor in factors]
     for factor, level in zip(factors, levels, strict=True):
         if needed and math.isnan(level):
@@ -390,9 +390,9 @@ def _snapped(coded: Array) -> Array:
 
 
 def _rows(sheet: Sheet, used: npt.NDArray[np.int64], coded: Array) -> list[list[int]]:
-    """Runs that repeat one row of the design, by the column "row"; every run by itself where levels or numbers differ.
+    """Runs that repeat one row of the design, by the column "row"; every run by itself if levels or numbers differ.
 
-    Rows of the design come in their order, so that a two-level design is found again in its table.
+    Rows of the design come in order, so that a two-level design is recognised in its table.
     """
     if "row" not in sheet.columns:
         return [[k] for k in range(len(used))]
@@ -418,7 +418,7 @@ def _place(sheet: Sheet, position: int) -> int:
 
 
 def _label(sheet: Sheet, position: int) -> str:
-    """What a run is called: its number in the sheet, else its line."""
+    """Label of a run: its number in the sheet, else its line."""
     if "run" in sheet.columns:
         return sheet.cells[position][sheet.columns["run"]][:20] or f"line {sheet.lines[position]}"
     return f"line {sheet.lines[position]}"

@@ -1,4 +1,4 @@
-"""A design with the order of its runs and what they will be able to see: the content of ``plan.json``."""
+"""A design with the order of its runs and the effects that they can detect: the content of ``plan.json``."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TERMS = {
     "interaction": "of an interaction",
     "square": "curvature, centre → end",
 }
-"""Kind of a term → the change that it is, in words."""
+"""Kind of a term → the change that it describes, in words."""
 OF_NAMES = (
     "A factor of three names and more is tested by all of them at once (F); the change is that between two of its "
     "names, the others midway, which is seen least."
@@ -40,8 +40,8 @@ class PlanResult(Document):
     """A design with the order of its runs: the content of ``plan.json``.
 
     ``coded``: levels of its rows, −1 … +1, shape (rows, k). ``sequence``: row and replicate of every run, from 1, in
-    the order to make them; ``seeds`` and ``block`` (from 1, empty without blocks) of each. ``model``, ``power``: the
-    polynomial that the runs bear, and what they tell of its terms, in units of ``sigma``, or of it where that is NaN.
+    the order to make them; ``seeds`` and ``block`` (from 1, empty without blocks) of each. ``model``: the polynomial
+    that the runs support. ``power``: their precision for its terms, as multiples of sigma if ``sigma`` is NaN.
     """
 
     SCHEMA: ClassVar[int] = 1
@@ -71,7 +71,7 @@ class PlanResult(Document):
 def design_plan(
     plan: RunPlan, file: FactorsFile, sigma: float | None, effect: float | None, about: About
 ) -> PlanResult:
-    """The record of ``plan``; ``sigma``: standard deviation of one run, ``effect``: a change to see, where known."""
+    """The record of ``plan``; ``sigma``: standard deviation of one run, ``effect``: a change to detect, if known."""
     order = planned_order(plan, file)
     return PlanResult(
         title=file.title,
@@ -96,7 +96,7 @@ def design_plan(
 
 
 def beyond(plan: RunPlan, file: FactorsFile) -> list[str]:
-    """A sentence about runs beyond low … high, which a laboratory may not be able to make."""
+    """A sentence about runs outside low … high, which a laboratory may not be able to make."""
     if plan.finished or np.abs(plan.coded).max() <= 1 + 1e-9:
         return []
     natural = region_of(file.factors).natural(plan.coded)
@@ -108,7 +108,7 @@ def beyond(plan: RunPlan, file: FactorsFile) -> list[str]:
 
 
 def blocks(plan: RunPlan) -> list[str]:
-    """A sentence about the blocks: their sizes, in the order in which they are run."""
+    """A sentence about the blocks: their sizes, in running order."""
     if not len(plan.block):
         return []
     sizes = ", ".join(map(str, np.bincount(plan.block)))
@@ -117,7 +117,7 @@ def blocks(plan: RunPlan) -> list[str]:
 
 
 def planned_order(plan: RunPlan, file: FactorsFile) -> Order | None:
-    """The model that the runs bear beside their blocks; None where they leave no error even for the linear one."""
+    """The model that the runs support besides their blocks; None if even a linear one leaves nothing for the error."""
     letters = factor_letters(plan.coded.shape[1])
     runs, values = plan.coded[plan.sequence[:, 0]], np.zeros((len(plan.sequence), 1))
     if _many_names(file):
@@ -136,13 +136,13 @@ def planned_order(plan: RunPlan, file: FactorsFile) -> Order | None:
 def planned_power(
     plan: RunPlan, file: FactorsFile, sigma: float | None, effect: float | None
 ) -> tuple[TermPrecision, ...]:
-    """What the runs will tell of each kind of the model's terms, in units of sigma where that is not known."""
+    """The precision of the runs for each kind of term of the model, in units of sigma if sigma is not known."""
     order = planned_order(plan, file)
     if order is None:
         return ()
     letters = factor_letters(plan.coded.shape[1])
     runs = plan.coded[plan.sequence[:, 0]]
-    # Without a sigma everything is counted in it.
+    # Without a known sigma, everything is in units of sigma.
     if _many_names(file):
         levels = _names(file)
         terms = orders_of(levels)[order]
@@ -156,5 +156,5 @@ def _many_names(file: FactorsFile) -> bool:
 
 
 def _names(file: FactorsFile) -> list[int]:
-    """Number of names per factor, 0 of a number."""
+    """Number of names per factor, 0 for a numeric factor."""
     return [len(factor.levels) for factor in file.factors]

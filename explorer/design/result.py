@@ -1,4 +1,4 @@
-"""An analysed sheet with what was asked of it: the content of ``result.json``, and the views of it that charts draw."""
+"""An analysed sheet with its order: the content of ``result.json``, and the views of it that charts draw."""
 
 from __future__ import annotations
 
@@ -49,22 +49,22 @@ class RunCount(Record):
 
 @dataclass(frozen=True)
 class DrawnEffects:
-    """The effects of a two-level design as the charts of a screening read them."""
+    """The effects of a two-level design, in the form that the charts of a screening read."""
 
     analysis: Screening
     columns: tuple[str, ...]
     factors: tuple[SheetFactor, ...]
     response: str
     aliases: Mapping[str, tuple[str, ...]]
-    """Column → what else it holds."""
+    """Column → the other effects that it contains."""
     curvature: Curvature | None
 
 
 @dataclass(frozen=True, kw_only=True)
 class DesignResult(Document):
-    """``design``: kind of the design, "" where the sheet does not say. ``coded``: its levels, shape (rows, k).
+    """``design``: kind of the design, "" if the sheet does not state it. ``coded``: its levels, shape (rows, k).
 
-    ``labels``: what the valid runs are called, in the order of the model's runs. ``target``: value that was asked for.
+    ``labels``: labels of the valid runs, in the order of the model's runs. ``target``: the requested value.
     """
 
     SCHEMA: ClassVar[int] = 2
@@ -86,7 +86,7 @@ class DesignResult(Document):
 
     @property
     def names(self) -> tuple[tuple[str, ...], ...]:
-        """The names of each factor, () of a number, in a model that tells them apart."""
+        """The names of each factor, () for a numeric one, in a model that tells names apart."""
         found = self.analysis.named or self.analysis.random
         return found.levels if found is not None else ((),) * len(self.factors)
 
@@ -102,7 +102,7 @@ class DesignResult(Document):
 
     @property
     def effects(self) -> DrawnEffects | None:
-        """The effects of a two-level design; None of any other."""
+        """The effects of a two-level design; None for any other."""
         found = self.analysis.effects
         if found is None:
             return None
@@ -113,7 +113,7 @@ class DesignResult(Document):
 
     @property
     def optimum(self) -> OptimumResult | None:
-        """The setting for the target; None where none was asked for, or there is no model."""
+        """The setting for the target; None if no target was given, or there is no model."""
         found = self.analysis.optimum
         if found is None:
             return None
@@ -122,7 +122,7 @@ class DesignResult(Document):
 
     @property
     def fitted(self) -> FittedTarget | None:
-        """The response surface; None where the runs bear no model."""
+        """The response surface; None if the runs do not support a model."""
         found = self.analysis.model
         if found is None:
             return None

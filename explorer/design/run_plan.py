@@ -1,15 +1,15 @@
-"""A design with its replicates in the order in which it is run, and its sheet: a CSV file to fill in anywhere.
+"""A design with its replicates in running order, and its sheet: a CSV file to fill in anywhere.
 
 # design | box-behnken | …                          what it is
 # factor | shear_modulus | 46.18 | 58.34 | MPa | 56.3      name, low, high, unit, reference
 row,replicate,run,seed,shear_modulus [MPa],…,angle_of_repose_deg
 3,1,1,3,46.18,…,
 
-A factor of names is declared by ``# levels | solvent | water | ethanol``.
+``# levels | solvent | water | ethanol`` declares a factor with named levels.
 
-One line per run, in the order to run them. ``row`` is the row of the design in standard order, ``seed`` a number of its
-own for an engine that draws at random. An empty cell is a run that is missing. Lines that begin with # are comments.
-With blocks there is a column ``block`` as well, 1, 2, …: all runs of one block come before those of the next.
+One line per run, in running order. ``row`` is the row of the design in standard order; ``seed`` is a different number
+for every run, for an engine that draws at random. An empty cell is a missing run. Lines that begin with # are comments.
+With blocks there is also a column ``block``, 1, 2, …: all runs of one block come before those of the next.
 """
 
 from __future__ import annotations
@@ -48,16 +48,16 @@ OPTIONS = {
     "kept": "--augment",
     "lattice": "--lattice",
 }
-"""Option of a design → how it is spelt on the command line."""
+"""Option of a design → its spelling on the command line."""
 COLUMNS = ("row", "replicate", "run", "seed")
 BLOCK = "block"
-"""Column of a sheet whose runs are made in blocks."""
+"""Column of the block, in a sheet whose runs are made in blocks."""
 SEPARATOR = " | "
 
 
 @dataclass(frozen=True)
 class DesignOrder:
-    """What a user asked for; None: as the factors file says, else the usual value."""
+    """What a user asked for; None means the value of the factors file, or else the default."""
 
     design: str
     _: KW_ONLY
@@ -74,7 +74,7 @@ class DesignOrder:
     nonregular: bool = False
     model: ModelOrder | None = None
     constraints: tuple[str, ...] = ()
-    """In the factors' units, as "A + B <= 1"."""
+    """In the factors' units, such as "A + B <= 1"."""
     lattice: int | None = None
     augment: Path | None = None
     """Sheet whose finished runs are kept."""
@@ -84,9 +84,9 @@ class DesignOrder:
 class RunPlan:
     """A design and its runs.
 
-    ``sequence`` (runs, 2): row of the points and replicate, from 0, in the order in which they are run. ``seeds``
-    (runs,): a different one for every run. ``block`` (runs,): of each run, from 0; empty where there are none.
-    ``finished``: cells of the responses of the runs that are kept, which stand first.
+    ``sequence`` (runs, 2): row of the points and replicate, from 0, in running order. ``seeds`` (runs,): a different
+    one for every run. ``block`` (runs,): block of each run, from 0; empty if there are none. ``finished``: response
+    cells of the kept runs, which come first.
     """
 
     design: Design
@@ -104,7 +104,7 @@ class RunPlan:
 
     @property
     def replicates(self) -> int:
-        """Runs of each row."""
+        """Number of runs of each row."""
         return len(self.sequence) // len(self.coded)
 
 
@@ -169,7 +169,7 @@ def make_plan(order: DesignOrder, file: FactorsFile) -> RunPlan:
 
 
 def _seeds(first: int, runs: int, finished: Array) -> npt.NDArray[np.int64]:
-    """A seed for every run: finished ones, which stand first, keep theirs, and the others count on from the largest."""
+    """A seed for every run: finished runs, which come first, keep theirs; the others continue above the largest."""
     new = np.append(np.isnan(finished), np.ones(runs - len(finished), dtype=np.bool_))
     own = finished[~new[: len(finished)]].astype(np.int64)
     seeds = np.empty(runs, dtype=np.int64)
@@ -179,7 +179,7 @@ def _seeds(first: int, runs: int, finished: Array) -> npt.NDArray[np.int64]:
 
 
 def _require_parts(file: FactorsFile) -> None:
-    """The high of a part is what is left where all others are at their lows: one room for all."""
+    """Require equal widths low … high of all parts: a part is at its high when all others are at their lows."""
     rooms = [factor.high - factor.low for factor in file.factors]
     named = [factor.name for factor in file.factors if factor.levels]
     if named:
@@ -194,7 +194,7 @@ def _require_parts(file: FactorsFile) -> None:
 
 
 def _refuse_levels_between_names(design: Design, file: FactorsFile, coded: Array) -> None:
-    """A factor of names is run at them, and at nothing between or beyond."""
+    """Refuse a design that needs levels between or beyond the names of a factor."""
     for factor, column in zip(file.factors, coded.T, strict=True):
         if factor.levels and not np.isclose(column[:, None], factor.codes, atol=1e-9).any(axis=1).all():
             takers = ", ".join(other.name for other in DESIGNS.values() if "levels" in other.options)
@@ -205,7 +205,7 @@ def _refuse_levels_between_names(design: Design, file: FactorsFile, coded: Array
 
 
 def _points(design: Design, factors: int, options: DesignOptions) -> Points:
-    """The rows; blocks that a design has not are refused with what there is for every design."""
+    """The rows. For blocks that a design does not have, the error names those that every design has."""
     try:
         return design.points(factors, options)
     except StatisticsError as error:
@@ -217,7 +217,7 @@ def _points(design: Design, factors: int, options: DesignOptions) -> Points:
 
 
 def _refuse_foreign_options(design: Design, options: DesignOptions, asked: Iterable[str]) -> None:
-    """An option of another design is a misunderstanding, not to be passed over."""
+    """Refuse an option of another design: ignoring it would hide a misunderstanding."""
     for name in asked:
         if name not in design.options:
             takers = ", ".join(other.name for other in DESIGNS.values() if name in other.options)
@@ -235,12 +235,12 @@ def sheet_content(plan: RunPlan, file: FactorsFile, workbook: bool, decimal_comm
     """The empty sheet as a file: a workbook (.xlsx), or CSV."""
     if workbook:
         return sheet_workbook(plan, file)
-    # Without the mark at its head a spreadsheet takes the file's letters for Windows's.
+    # Without the mark at its start, a spreadsheet assumes a Windows encoding.
     return ("\ufeff" * decimal_comma + sheet_text(plan, file, decimal_comma)).encode()
 
 
 def sheet_text(plan: RunPlan, file: FactorsFile, decimal_comma: bool = False) -> str:
-    """The empty sheet as CSV; with decimal commas, semicolons are between the cells, as spreadsheets have it there."""
+    """The empty sheet as CSV; with decimal commas, semicolons separate the cells, as such spreadsheets expect."""
     comments, rows = _sheet(plan, file)
     stream = io.StringIO()
     stream.writelines(f"{line}\n" for line in comments)
@@ -252,8 +252,8 @@ def sheet_text(plan: RunPlan, file: FactorsFile, decimal_comma: bool = False) ->
 
 
 def sheet_workbook(plan: RunPlan, file: FactorsFile) -> bytes:
-    """The empty sheet as a workbook (.xlsx); what is a number is one there."""
-    # Imported where it is used: it takes a second, and few sheets are workbooks.
+    """The empty sheet as a workbook (.xlsx), in which numbers are stored as numbers."""
+    # Imported only here: it takes a second, and few sheets are workbooks.
     import pandas
 
     comments, rows = _sheet(plan, file)
@@ -265,7 +265,7 @@ def sheet_workbook(plan: RunPlan, file: FactorsFile) -> bytes:
 
 
 def _sheet(plan: RunPlan, file: FactorsFile) -> tuple[list[str], list[list[str]]]:
-    """The comments of the sheet, and its rows, the header first."""
+    """The comments of the sheet, and its rows with the header first."""
     comments = [
         SEPARATOR.join(
             ["# design", plan.design.name, *plan.points.traits, *plan.points.generators, f"seed {plan.seed}"]
@@ -296,5 +296,5 @@ def level_text(factor: DesignFactor, value: float) -> str:
 
 
 def written(value: float) -> str:
-    """A level with twelve digits: rounding dust of the coding is gone, nothing that was meant is."""
+    """A level with twelve digits: removes rounding errors of the coding, but nothing that was intended."""
     return np.format_float_positional(float(f"{value:.12g}"), trim="-")

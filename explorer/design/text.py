@@ -1,6 +1,7 @@
 """What `explorer design` and `explorer analyse` print.
 
-A design: its size, its aliases, and what it will be able to see. An analysis: the answer, then the tables behind it.
+For a design: its size, its aliases, and the effects that it can detect. For an analysis: the answer, then the tables
+behind it.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ from explorer.units import counted, number
 
 
 def check_power(design: str, sigma: float | None, effect: float | None) -> None:
-    """Refuse what is neither the standard deviation of a run nor a change of its result, and both for a mixture."""
+    """Refuse impossible values for the standard deviation of a run and the change to detect, and both for a mixture."""
     for option, value in (("--sigma", sigma), ("--effect", effect)):
         if value is not None and not 0 < value < math.inf:
             raise CommandError(f"{option} {value:g}: allowed: a positive number")
@@ -68,7 +69,7 @@ def plan_result(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: f
 
 
 def _optimal_result(plan: RunPlan) -> dict[str, Any]:
-    """What an optimal design says of itself, as JSON types."""
+    """The properties of an optimal design, as JSON types."""
     assert plan.points.efficiency is not None
     return {
         "efficiency": plan.points.efficiency.to_dict(),
@@ -134,7 +135,7 @@ def _power_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: f
 
 
 def _mixture_text(plan: RunPlan) -> str:
-    """Which of Scheffé's polynomials the runs bear."""
+    """Which of Scheffé's polynomials the runs support."""
     letters = factor_letters(plan.coded.shape[1])
     order = bearable_order((plan.coded[plan.sequence[:, 0]] + 1) / 2, letters)
     if order is None:
@@ -176,7 +177,7 @@ def analysis_text(result: DesignResult) -> str:
     for section in (in_short(result), diagnostics(result), shape(result), target(result)):
         if section is not None:
             facts = [pair for block in section.blocks if isinstance(block, Facts) for pair in block.pairs]
-            # The answer stands first and again under its own heading in a report; a terminal needs it once.
+            # A report has the answer at the top and again under its own heading; a terminal needs it once.
             parts.append("\n".join(f"{what}: {words}" for what, words in facts if words not in told))
             told |= {words for _, words in facts}
     if result.optimum is not None:
@@ -189,5 +190,5 @@ def analysis_text(result: DesignResult) -> str:
 
 
 def _table(table: Table) -> str:
-    # Typographic minus signs are no numbers to a terminal's columns.
+    # The columns of a terminal do not recognise numbers with typographic minus signs.
     return text_table(table.header, [[cell.replace("−", "-").replace("–", "-") for cell in row] for row in table.rows])

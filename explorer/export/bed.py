@@ -1,7 +1,7 @@
-"""A bed of spheres in a box with a floor and four walls, for timing engines on one and the same state.
+"""A bed of spheres in a box with a floor and four walls, for timing engines on the same state.
 
-Both engines take it as plain spheres, no clumps. They stop after a number of steps, print the time of their stepping
-loop and write ``final.txt`` (see ``frames.py``). Contacts begin without tangential springs in either.
+Both engines read it as plain spheres, not clumps. They stop after a number of steps, print the time of their stepping
+loop and write ``final.txt`` (see ``frames.py``). Contacts begin without tangential springs in both.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ DATA, SCRIPT = "spheres.data", "yade_bed.py"
 
 @dataclass(frozen=True)
 class Bed:
-    """Spheres of one material in a box of the same material, open at the top (n of them)."""
+    """Spheres (n of them) of one material in a box of the same material, open at the top."""
 
     position: Array
     """Centres [m], shape (n, 3)."""
@@ -47,7 +47,7 @@ class Bed:
     low: tuple[float, float, float]
     """Corner of the box; the floor is at ``low[2]`` [m]."""
     high: tuple[float, float, float]
-    """Opposite corner; the sides end nowhere and there is no lid [m]."""
+    """Opposite corner [m]; the sides are infinite and there is no lid."""
     dt: float
     """[s]."""
     steps: int
@@ -106,4 +106,4 @@ def write_yade_bed(folder: Path, bed: Bed) -> None:
 
 
 BED_WRITERS: dict[str, Callable[[Path, Bed], None]] = {"liggghts": write_liggghts_bed, "yade": write_yade_bed}
-"""Engine → what writes its bed into an existing folder."""
+"""Engine → function that writes its bed into an existing folder."""

@@ -1,7 +1,8 @@
-"""A deck: everything that another engine needs to repeat a pour of ours, in SI and in no engine's terms.
+"""A deck: everything that another engine needs to repeat a pour of ours, in SI and in engine-neutral terms.
 
-Materials, bodies, and walls as triangles; a scene with what no deck can hold is refused. ``deck.json`` holds it in
-every exported folder; LIGGGHTS's input and its STL files are written from it, YADE's script reads it.
+It holds materials, bodies, and walls as triangles; a scene with anything that a deck cannot hold is refused. Every
+exported folder has the deck as ``deck.json``; LIGGGHTS's input and STL files are written from it, YADE's script reads
+it.
 """
 
 from __future__ import annotations
@@ -30,13 +31,13 @@ Array = npt.NDArray[np.float64]
 
 FILE = "deck.json"
 SIDES = 96
-"""Corners of a circle of a revolved wall."""
+"""Corners of the polygon that represents a circle of a revolved wall."""
 BANDS = 3
-"""Rings of triangles along the line that is turned: more of them are less slender."""
+"""Rings of triangles along the profile of a revolved wall: more rings make the triangles less slender."""
 HOLDS = (RollingResistance.name,)
-"""Effects of contacts that a deck can say; an engine may have the law of fewer."""
+"""Effects of contacts that a deck can express; an engine may support fewer."""
 LAWS = (HertzMindlin.name, LinearSpringDashpot.name)
-"""Contact laws that a deck can say; an engine may have fewer."""
+"""Contact laws that a deck can express; an engine may support fewer."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class DeckClump:
     inertia: Array
     """Principal moments about x, y, z [kg m²], shape (3,)."""
     density: float
-    """Of the material [kg/m³]; the mass does not follow from it."""
+    """Density of the material [kg/m³]; the mass does not follow from it."""
     youngs_modulus: float
     poisson_ratio: float
 
@@ -66,9 +67,9 @@ class DeckMesh:
     triangles: Array
     """Corners [m], shape (t, 3, 3)."""
     until_step: int = -1
-    """The wall is taken away when this many steps are done; −1: never."""
+    """The wall is removed after this many steps; −1: never."""
     of_file: bool = False
-    """Whether the triangles are those of a mesh file, and not of a polygon of ``SIDES`` corners."""
+    """Whether the triangles come from a mesh file, and not from a polygon with ``SIDES`` corners."""
 
 
 @dataclass(frozen=True)
@@ -94,16 +95,16 @@ class Deck:
     law: str
     """Name of the law here (``solver.laws``)."""
     characteristic_velocity: float
-    """Of linear springs [m/s]; Hertz–Mindlin does not read it."""
+    """Characteristic velocity of linear springs [m/s]; Hertz–Mindlin does not use it."""
     tangential_law: str
     tangential_dashpot: str
-    """Conventions that the pour was calculated with here (``solver.scenes.material``); an engine has its own."""
+    """Conventions of our own pour (``solver.scenes.material``); another engine has its own."""
     entries: Entries
     plate: float | None
     """Height of the infinite plate [m]; None: there is none."""
     meshes: tuple[DeckMesh, ...]
     box: Array
-    """Corners (low, high) of the room in which bodies are expected [m], shape (2, 3)."""
+    """Corners (low, high) of the space in which bodies are expected [m], shape (2, 3)."""
 
     @property
     def bodies(self) -> int:
@@ -120,17 +121,17 @@ class DeckTarget(ExportTarget):
 
     goes_on = True
     holds: tuple[str, ...] = ()
-    """Effects of contacts and flight that its law has as well."""
+    """Effects of contacts and flight that the engine's law supports."""
     laws: tuple[str, ...] = (HertzMindlin.name,)
-    """Contact laws that it has."""
+    """Contact laws that the engine has."""
 
     def check(self, scene: Scene) -> None:
-        """Raise :class:`CommandError` for what its deck cannot hold."""
+        """Raise :class:`CommandError` for anything that the engine's deck cannot hold."""
         check_exportable(scene, self.name, self.holds, self.laws)
 
     def write(self, folder: Path, order: ExportOrder) -> str:
-        """Pour, and write the deck of it."""
-        # Imported here: it loads Taichi, and a target can be named without.
+        """Run the pour, and write its deck."""
+        # Imported here because it loads Taichi, which merely naming a target does not need.
         from solver import run_pour
 
         deck = deck_of(run_pour(order.scene, order.seed), order.time)
@@ -143,11 +144,11 @@ class DeckTarget(ExportTarget):
 
 
 def deck_of(record: Record, time: float | None = None) -> Deck:
-    """The deck that repeats ``record``: the same bodies at the same moments and places, the same number of steps.
+    """The deck that repeats ``record``: the same bodies at the same moments and places, for the same number of steps.
 
     Args:
-        record: a pour of ours; its entries say how bodies enter, and its gate when it opens.
-        time: simulated time [s] instead of the record's; bodies that enter later are left out.
+        record: a pour of ours; it says how bodies enter, and when its gate opens.
+        time: simulated time [s] to use instead of the record's; bodies that enter later are left out.
 
     Raises:
         CommandError: the scene has something that no exported deck can hold.
@@ -171,8 +172,8 @@ def check_exportable(
 ) -> None:
     """Raise :class:`CommandError` if ``scene`` has something that a deck for ``engine`` cannot hold.
 
-    Effects of material and set-up are carried out in a deck; of those of contacts and flight ``holds`` are the ones
-    that have an equal there, and ``laws`` the contact laws.
+    A deck already includes the effects of material and set-up. ``holds`` are the effects of contacts and flight that
+    have an equivalent there, and ``laws`` the contact laws.
     """
     scene = actual(scene)
     for effect in scene.effects:
@@ -183,7 +184,7 @@ def check_exportable(
         allowed = ", ".join(laws)
         raise CommandError(f"contact.law: {scene.contact.law!r} cannot be exported to {engine}; allowed: {allowed}")
     if scene.contact.clump_rule != "body_mass":
-        # No engine of these damps by the mass that acts at a contact.
+        # None of these engines damps by the mass that acts at a contact.
         raise CommandError(
             f"contact.clump_rule: {scene.contact.clump_rule!r} cannot be exported to {engine}; allowed: body_mass"
         )
@@ -215,7 +216,7 @@ def assembled(
     plate: float | None = None,
     meshes: tuple[DeckMesh, ...] = (),
 ) -> Deck:
-    """A deck with the materials and bodies of ``scene`` that enter as ``entries`` say, and whatever walls are given."""
+    """A deck with the materials and bodies of ``scene``, which enter according to ``entries``, and the given walls."""
     friction, restitution = pair_tables(scene)
     wall = scene.material(scene.rig.wall)
     return Deck(
@@ -261,7 +262,7 @@ def _clumps(scene: Scene) -> tuple[DeckClump, ...]:
 
 
 def pair_tables(scene: Scene) -> tuple[Array, Array]:
-    """Friction and restitution of all classes; wall against wall, which never meet, get those of the first body."""
+    """Friction and restitution of all classes; wall against wall never occurs and gets values of the first body."""
     n, wall = len(scene.bodies), scene.rig.wall
     others: tuple[Body | str, ...] = (*scene.bodies, wall)
     pairs = [[scene.contact_pair(one, other) for other in others] for one in scene.bodies]
@@ -304,8 +305,8 @@ def _box(scene: Scene) -> Array:
 def revolved_triangles(surface: Revolved) -> Array:
     """Corners (t, 3, 3) [m] of a polygonal cone, or of one triangle around a disc.
 
-    The polygons have the area of the circles that they stand for: flats are 1.8e-4 radii inside, corners 3.6e-4
-    outside. A disc (a gate) becomes the triangle that holds it: every edge inside a flat surface is one more place
+    The polygons have the area of the circles that they represent: flats are 1.8e-4 radii inside, corners 3.6e-4
+    outside. A disc (a gate) becomes the triangle that encloses it: every edge within a flat surface is one more place
     at which engines may push twice.
     """
     if surface.z0 == surface.z1 and min(surface.r0, surface.r1) == 0.0:
@@ -330,7 +331,7 @@ def _around(radius: float, height: float) -> Array:
 
 
 def mesh_triangles(surface: TriangleMesh) -> Array:
-    """Corners (t, 3, 3) [m] of a mesh where it stands."""
+    """Corners (t, 3, 3) [m] of a mesh at its place in the rig."""
     turn = rotation_matrix(np.array(surface.pose.quaternion))
     corners = np.array(surface.vertices) @ turn.T + np.array(surface.pose.origin)
     return np.asarray(corners[np.array(surface.faces)])
@@ -343,7 +344,7 @@ def write_deck(folder: Path, deck: Deck) -> None:
 
 
 def read_deck(folder: Path) -> Deck:
-    """The deck in ``folder``; OSError where there is none."""
+    """The deck in ``folder``; OSError if there is none."""
     table: dict[str, Any] = json.loads((folder / FILE).read_text(encoding="utf-8"))
     table["clumps"] = tuple(DeckClump(**_arrays(entry, "centres", "radii", "inertia")) for entry in table["clumps"])
     table["meshes"] = tuple(DeckMesh(**_arrays(entry, "triangles")) for entry in table["meshes"])

@@ -1,8 +1,8 @@
-"""What the engines write: the state of all member spheres at one moment, in the text form of a LAMMPS dump.
+"""The output of the engines: the state of all member spheres at one moment, in the text form of a LAMMPS dump.
 
-``final.txt`` holds the last moment, ``trajectory.txt`` (if it was asked for) one every so many steps. Columns: id,
-radius, x, y, z, vx, vy, vz, omegax, omegay, omegaz; SI. Spheres are numbered from 1 in order of entry, those of a body
-one after the other in the order of its clump.
+``final.txt`` holds the last moment, ``trajectory.txt`` (if requested) one moment every so many steps. Columns: id,
+radius, x, y, z, vx, vy, vz, omegax, omegay, omegaz; SI. Spheres are numbered from 1 in order of entry; the spheres of a
+body are consecutive, in the order of its clump.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ HEADER = 9
 
 @dataclass(frozen=True)
 class SphereFrame:
-    """All spheres of one moment (n of them), in order of their number."""
+    """All spheres of one moment (n of them), in order of their numbers."""
 
     step: int
     """Steps done, in the engine's own counting."""
@@ -34,9 +34,9 @@ class SphereFrame:
     position: Array
     """Centres [m], shape (n, 3)."""
     velocity: Array
-    """Of the centres [m/s], shape (n, 3)."""
+    """Velocity of the centres [m/s], shape (n, 3)."""
     spin: Array
-    """Of the body, in the world's frame [rad/s], shape (n, 3)."""
+    """Spin of the body, in the world's frame [rad/s], shape (n, 3)."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class BodyFrame:
     rotation: Array
     """Principal frame → world, shape (n, 3, 3); about the axis of a straight row of spheres it is arbitrary."""
     velocity: Array
-    """Of the centres of mass [m/s], shape (n, 3)."""
+    """Velocity of the centres of mass [m/s], shape (n, 3)."""
     spin: Array
     """In the world's frame [rad/s], shape (n, 3)."""
 
@@ -72,7 +72,7 @@ def final_frame(folder: Path) -> SphereFrame:
 
 
 def motion(deck: Deck, frame: SphereFrame) -> BodyFrame:
-    """Bodies behind the spheres of ``frame``: those that have entered by then, as far as their spheres go."""
+    """Bodies behind the spheres of ``frame``: those that have entered by then, as far as their spheres are there."""
     places, turns, velocities, spins, first = [], [], [], [], 0
     for body in range(deck.bodies):
         local = deck.members(body)

@@ -1,9 +1,9 @@
-"""Single impacts in LIGGGHTS: the cases of ``solver.verification`` as input, run, and read back.
+"""Single impacts in LIGGGHTS: the cases of ``solver.verification`` are written as input, run, and read back.
 
-The law is that of every other deck here (``liggghts.py``): ``hertz tangential history``, or ``hooke`` for linear
-springs, with ``limitForce on`` and a restitution whose damping is ours, so that the normal force is the same function.
-Hertz's tangential force stays LIGGGHTS's own: a displacement times the present stiffness 8 G* a, whether the contact is
-loaded or unloaded (LIGGGHTS-PUBLIC 3.8.0, ``tangential_model_history.h``), where ours is a force that is scaled down on
+The law is the same as in every other deck here (``liggghts.py``): ``hertz tangential history``, or ``hooke`` for linear
+springs, with ``limitForce on`` and a restitution that gives our damping, so that the normal force is the same function.
+Hertz's tangential force remains LIGGGHTS's own: a displacement times the present stiffness 8 G* a, whether the contact
+is loaded or unloaded (LIGGGHTS-PUBLIC 3.8.0, ``tangential_model_history.h``). Ours is a force that is scaled down on
 unloading.
 """
 
@@ -46,11 +46,11 @@ from solver.verification.impacts import (
 Array = npt.NDArray[np.float64]
 DATA = "spheres.data"
 BY_DEFAULT = ContactSettings()
-"""Hertz–Mindlin, nothing resists rolling."""
+"""Hertz–Mindlin without rolling resistance."""
 SKIN = 0.4
 """Reach of the contact list beyond touching, in radii of the largest sphere."""
 LENGTH = 4.0
-"""Of a run, in elastic contact times: a damped contact with e = 0.5 lasts 1.3 of them."""
+"""Length of a run, in elastic contact times: a damped contact with e = 0.5 lasts 1.3 of them."""
 
 
 def liggghts_engine(limit: float | None = None, contact: ContactModel = DECLARED_BY_NOBODY) -> Engine:
@@ -61,13 +61,13 @@ def liggghts_engine(limit: float | None = None, contact: ContactModel = DECLARED
     limit
         Wall time after which a run is stopped [s]; None: never.
     contact
-        Its law is run; conventions are LIGGGHTS's own.
+        The contact model whose law is run; conventions are LIGGGHTS's own.
 
     Raises
     ------
     CommandError
-        On a call: LIGGGHTS is not installed, failed, or took longer than ``limit``; or a sphere has not left the
-        plane or its target at the end.
+        On a call: LIGGGHTS is not installed, failed, or took longer than ``limit``; or a sphere is still in contact
+        with the plane or its target at the end.
     """
     law = ContactSettings(law=contact.law, characteristic_velocity=contact.characteristic_velocity)
     on_plane, on_target = (functools.partial(one, limit=limit, law=law) for one in (_rebounds, _struck))
@@ -77,7 +77,7 @@ def liggghts_engine(limit: float | None = None, contact: ContactModel = DECLARED
 def plane_input(folder: Path, impacts: Sequence[Impact], law: ContactSettings = BY_DEFAULT) -> None:
     """Write ``in.liggghts`` and ``spheres.data`` for impacts on the rigid plane z = 0, ``STEPS_PER_CONTACT`` each.
 
-    Every kind of sphere (material, restitution, friction) is a type of its own, the plane the last one.
+    Every kind of sphere (material, restitution, friction) is a type of its own; the plane is the last type.
     """
     kinds = list(dict.fromkeys((i.material, i.restitution, i.friction) for i in impacts))
     types = np.array([1 + kinds.index((i.material, i.restitution, i.friction)) for i in impacts])
@@ -88,7 +88,7 @@ def plane_input(folder: Path, impacts: Sequence[Impact], law: ContactSettings = 
     spheres = FreeSpheres(
         types, radius, np.array([i.material.density for i in impacts]), place, _velocity(impacts), _spin(impacts)
     )
-    # Only sphere and plane meet; what stands for two spheres is not used.
+    # Only sphere and plane meet; the values for two spheres are not used.
     of_kind = np.array([[e, mu] for _, e, mu in kinds] + [[1.0, 0.0]])
     restitution = np.minimum.outer(of_kind[:, 0], of_kind[:, 0])
     friction = np.maximum.outer(of_kind[:, 1], of_kind[:, 1])
@@ -101,7 +101,7 @@ def plane_input(folder: Path, impacts: Sequence[Impact], law: ContactSettings = 
 def target_input(
     folder: Path, impacts: Sequence[Impact], target: StruckSphere, law: ContactSettings = BY_DEFAULT
 ) -> None:
-    """Write the same files for impacts on a free sphere each; balls are numbered first, then the targets."""
+    """Write the same files for impacts on one free sphere each; the balls are numbered first, then the targets."""
     one, n = impacts[0], len(impacts)
     place = np.zeros((2 * n, 3))
     place[:, 1] = np.tile(np.arange(n) * 3.0 * target.radius, 2)

@@ -1,19 +1,19 @@
 """The deck for LIGGGHTS-PUBLIC 3.8: ``in.liggghts``, one file per clump, one STL per mesh.
 
-What makes it repeat our pour, in the order of the input:
+These settings make it repeat our pour, in the order of the input:
 
-- ``limitForce on`` cuts tension as our laws do, and every restitution is replaced by the one whose damping is ours
+- ``limitForce on`` cuts tension as our laws do, and every restitution is replaced by the one that gives our damping
   (:func:`unclamped_restitution`), so the normal laws are the same functions.
 - ``mass … inertia_tensor … use_density`` takes the declared centre of mass; ``use_volume`` would shift it to a Monte
-  Carlo estimate. The reduced mass of a contact is that of the bodies by itself.
+  Carlo estimate. The reduced mass of a contact is already that of the bodies.
 - One ``fix insert/pack`` per body in a cube of 0.2 nm, with the orientation as a quaternion, at its own step. LIGGGHTS
-  inserts after it moved the bodies of a step, so its step k + 1 is our k.
+  inserts bodies after moving those of a step, so its step k + 1 is our k.
 - ``boundary m`` lets the box follow bodies that roll out of it; ``f`` would delete them.
 
-What stays different with Hertz–Mindlin: the tangential spring is a displacement times the present stiffness (ours is a
-force that does not grow while the contact is loaded), it is projected when the normal turns (ours keeps its length),
-and its damping follows from the replaced restitution (18 % stronger at e = 0.5). Of linear springs the projection alone
-is different where ``contact.tangential_dashpot`` is uncapped: stiffness and both dampings are those of ours.
+Differences that remain with Hertz–Mindlin: the tangential spring is a displacement times the present stiffness (ours is
+a force that does not grow while the contact is loaded), it is projected when the normal turns (ours keeps its length),
+and its damping follows from the replaced restitution (18 % stronger at e = 0.5). With linear springs only the
+projection differs if ``contact.tangential_dashpot`` is uncapped: stiffness and both dampings equal ours.
 """
 
 from __future__ import annotations
@@ -37,24 +37,24 @@ from solver.scenes.scene import Scene, actual
 Array = npt.NDArray[np.float64]
 INPUT = "in.liggghts"
 LEAST_RESTITUTION = 0.05
-"""LIGGGHTS refuses a coefficient of restitution up to this one."""
+"""LIGGGHTS refuses coefficients of restitution up to and including this one."""
 SEEDS = (15485863, 15485867, 32452843)
-"""Primes for templates, distributions and insertion, which have to differ; nothing is drawn that acts on the result."""
+"""Primes for templates, distributions and insertion, which must differ; no random draw affects the result."""
 CUBE = 1e-10
 """Half the edge of the cube in which a centre of mass is placed [m]."""
 SOFT, HARD = 5e6, 1e9
 """Young's moduli [Pa] beyond which LIGGGHTS asks for a confirmation."""
 SKIN, CELL = 0.9, 6.0
-"""Reach of the contact list beyond touching, and size of its cells, in radii of the largest sphere: the fastest that
-were found for the seed pour. By default the box is cut into cells of half a contact distance, and to empty millions of
-them takes longer than everything else."""
+"""Reach of the contact list beyond touching, and size of its cells, in radii of the largest sphere: the fastest values
+found for the seed pour. By default the box is cut into cells of half a contact distance, and emptying millions of them
+takes longer than everything else."""
 MODELS = {
     HertzMindlin.name: "model hertz tangential history",
     LinearSpringDashpot.name: "model hooke tangential history",
 }
-"""What our laws are called there."""
+"""Names of our laws in LIGGGHTS."""
 ROLLING = " rolling_friction epsd2"
-"""Added to the model where something resists rolling: the law of our ``rolling_resistance``, without a dashpot."""
+"""Added to the model if there is rolling resistance: the law of our ``rolling_resistance``, without a dashpot."""
 
 
 def unclamped_restitution(restitution: float) -> float:
@@ -67,7 +67,7 @@ def unclamped_restitution(restitution: float) -> float:
 
 
 def write_liggghts(folder: Path, deck: Deck) -> None:
-    """Write the deck into ``folder``; :class:`CommandError` for what LIGGGHTS cannot take."""
+    """Write the deck into ``folder``; :class:`CommandError` for anything that LIGGGHTS does not accept."""
     for clump in deck.clumps:
         _check_clump(clump.name, len(clump.radii))
     text = "\n".join(_input(deck)) + "\n"
@@ -89,7 +89,7 @@ class Liggghts(DeckTarget):
     laws = (HertzMindlin.name, LinearSpringDashpot.name)
 
     def check(self, scene: Scene) -> None:
-        """Raise :class:`CommandError` for what a deck cannot hold, for bodies of one sphere and low restitutions."""
+        """Raise :class:`CommandError` for what a deck cannot hold, single-sphere bodies and low restitutions."""
         super().check(scene)
         scene = actual(scene)
         for body in scene.bodies:
@@ -106,12 +106,12 @@ LIGGGHTS = Liggghts()
 
 @dataclass(frozen=True)
 class ContactSettings:
-    """The law between particles and at walls, in words of LIGGGHTS: with our rolling resistance where there is one."""
+    """The law between particles and at walls, in LIGGGHTS's words, including our rolling resistance if there is one."""
 
     rolling_friction: float = 0.0
     law: str = HertzMindlin.name
     characteristic_velocity: float = 1.0
-    """[m/s]; of linear springs."""
+    """Characteristic velocity of linear springs [m/s]."""
 
     @property
     def words(self) -> str:
@@ -121,7 +121,7 @@ class ContactSettings:
     def pair_lines(self, moduli: list[float], ratios: list[float], restitution: Array, friction: Array) -> list[str]:
         """Materials by class and pairs of classes, and the law between particles.
 
-        Raises :class:`CommandError` where a restitution is too low for LIGGGHTS.
+        Raises :class:`CommandError` if a restitution is too low for LIGGGHTS.
         """
         n = len(moduli)
         replaced = _replaced(restitution)
@@ -138,12 +138,12 @@ class ContactSettings:
         ]
 
     def plane_line(self, name: str, wall: int, axis: str, place: float) -> str:
-        """An infinite plane of material ``wall`` across ``axis`` (x, y, z) at ``place`` [m]; R* is the sphere's."""
+        """An infinite plane of material ``wall`` normal to ``axis`` (x, y, z) at ``place`` [m]; R* is the sphere's."""
         plane = f"primitive type {wall} {axis}plane {place!r}"
         return f"fix {name} all wall/gran {self.words} {plane} limitForce on"
 
     def mesh_lines(self, names: list[str]) -> list[str]:
-        """All meshes as one wall; LIGGGHTS allows no more than one of this kind."""
+        """All meshes as one wall; LIGGGHTS allows only one of this kind."""
         meshes = f"n_meshes {len(names)} meshes {' '.join(names)}"
         return [f"fix walls all wall/gran {self.words} mesh {meshes} limitForce on"] if names else []
 
@@ -161,7 +161,7 @@ class ContactSettings:
 
 @dataclass(frozen=True)
 class FreeSpheres:
-    """Single spheres (n of them) as ``read_data`` takes them, no clumps."""
+    """Single spheres (n of them), not clumps, as ``read_data`` accepts them."""
 
     type: npt.NDArray[np.int64]
     """Number of the material, from 1, shape (n,)."""
@@ -178,18 +178,18 @@ class FreeSpheres:
 
 
 def write_spheres(path: Path, spheres: FreeSpheres, types: int, box: Array) -> None:
-    """Write ``spheres`` as ``read_data`` takes them for ``atom_style granular``: numbered from 1 in their order.
+    """Write ``spheres`` as ``read_data`` expects them for ``atom_style granular``: numbered from 1 in their order.
 
     Parameters
     ----------
     path
         File to write.
     spheres
-        What stands in it.
+        Content of the file.
     types
         Number of materials, walls included.
     box
-        Corners (low, high) of the room [m], shape (2, 3).
+        Corners (low, high) of the box [m], shape (2, 3).
     """
     sides = [f"{low:.12g} {high:.12g} {a}lo {a}hi" for a, low, high in zip("xyz", *box, strict=True)]
     columns = (spheres.type, spheres.radius, spheres.density, spheres.position)
@@ -228,7 +228,7 @@ def settings_lines(box: Array, types: int, skin: float) -> list[str]:
 
 
 def run_lines(steps: int, dt: float) -> list[str]:
-    """Time step and what is printed and written along the way: nothing, unless ``-var dump_every N`` asks for it."""
+    """Time step and the output along the way: there is none unless ``-var dump_every N`` asks for it."""
     return [
         f"timestep {dt!r}",
         "variable dump_every index 0",
@@ -249,7 +249,7 @@ def _input(deck: Deck) -> list[str]:
     ratios = [*(clump.poisson_ratio for clump in deck.clumps), deck.wall_poisson_ratio]
     wall, law = len(moduli), ContactSettings(deck.rolling_friction, deck.law, deck.characteristic_velocity)
     largest = max(float(clump.radii.max()) for clump in deck.clumps)
-    # Of several lines it would go on as commands.
+    # Further lines of a title would be read as commands.
     title = " ".join(deck.title.split())
     return [
         f"# {title}, seed {deck.seed}: {deck.bodies} bodies, {deck.steps} steps of {deck.dt:.6g} s",
@@ -270,7 +270,7 @@ def _input(deck: Deck) -> list[str]:
 
 
 def _replaced(restitution: Array) -> Array:
-    """What stands for restitutions there; :class:`CommandError` where one is too low for LIGGGHTS."""
+    """The restitutions to give to LIGGGHTS; :class:`CommandError` if one is too low for it."""
     replaced: Array = np.vectorize(unclamped_restitution, otypes=[float])(restitution)
     if replaced.min() <= LEAST_RESTITUTION:
         raise CommandError(
@@ -286,7 +286,7 @@ def _check_clump(name: str, spheres: int) -> None:
 
 
 def _confirmations(moduli: list[float]) -> list[str]:
-    """What LIGGGHTS wants to hear before it takes very soft or very hard particles."""
+    """The confirmations that LIGGGHTS requires for very soft or very hard particles."""
     soft = [f"soft_particles yes  # a modulus below {SOFT:g} Pa"] if min(moduli) < SOFT else []
     return soft + ([f"hard_particles yes  # a modulus above {HARD:g} Pa"] if max(moduli) > HARD else [])
 
@@ -314,9 +314,10 @@ def _insertion_lines(deck: Deck, body: int) -> list[str]:
 
 
 def _runs(deck: Deck, law: ContactSettings) -> list[str]:
-    """Runs between the moments at which a mesh is taken away; one step more than ours, since theirs begin at 1.
+    """Runs between the moments at which a mesh is removed; one step more than ours, because theirs begin at 1.
 
-    The wall is declared anew without it: contacts with the other meshes start over without a tangential spring.
+    The wall is then declared again without that mesh: contacts with the other meshes restart without a tangential
+    spring.
     """
     lines, done, there = [], 0, [mesh.name for mesh in deck.meshes]
     for mesh in sorted(deck.meshes, key=lambda mesh: mesh.until_step):

@@ -1,14 +1,14 @@
-"""A material as tables for EDEM, and any engine whose parameters are typed in: each coefficient with its convention.
+"""A material as tables for EDEM, or any engine whose parameters are typed in: each coefficient with its convention.
 
 materials.csv      density, shear modulus, Poisson's ratio, Young's modulus                       one row per material
 interactions.csv   restitution, static friction, rolling friction                                 one row per pair
 bodies.csv         mass, principal moments, member spheres: they do not follow from overlapping spheres
 conventions.csv    what each number means here and in EDEM, and whether it may be typed in as it is
 
-Coefficients of the same name differ between engines: a rolling friction acts on another arm and by another law, and a
-restitution may be damping that returns another restitution. Sources: Altair EDEM documentation (Hertz–Mindlin no slip,
-standard rolling friction); Ai, Chen, Rotter and Ooi 2011, Powder Technology 206:269; Thornton, Cummins and Cleary 2013,
-Powder Technology 233:30.
+Coefficients of the same name differ between engines: rolling friction acts on a different arm and by a different law,
+and a restitution may set a damping that yields a different restitution. Sources: Altair EDEM documentation
+(Hertz–Mindlin no slip, standard rolling friction); Ai, Chen, Rotter and Ooi 2011, Powder Technology 206:269; Thornton,
+Cummins and Cleary 2013, Powder Technology 233:30.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ LAWS = {
 
 
 def write_material_table(folder: Path, scene: Scene) -> None:
-    """Write the tables of ``scene``, its set-up effects carried out, and a README into an existing folder.
+    """Write the tables of ``scene``, with its set-up effects applied, and a README into an existing folder.
 
     Raises CommandError for a contact law whose conventions are not known here.
     """
@@ -80,7 +80,7 @@ class Edem(ExportTarget):
     pours, of_material = False, True
 
     def check(self, scene: Scene) -> None:
-        """Take everything: what the tables cannot hold is named in them."""
+        """Accept everything: the tables name what they cannot hold."""
 
     def write(self, folder: Path, order: ExportOrder) -> str:
         """Write the tables."""
@@ -96,7 +96,7 @@ def _materials(scene: Scene) -> Rows:
     rows: Rows = [("material", "density_kg_m3", "shear_modulus_Pa", "poisson_ratio", "youngs_modulus_Pa")]
     for one in scene.materials:
         if one.name in used | poured:
-            # Nothing here hangs on the density of a wall, so nobody has to have declared it.
+            # Nothing here depends on the density of a wall, so it need not be declared.
             density = _number(one.density) if one.name in poured else ""
             rows.append((one.name, density, *map(_number, (one.shear_modulus, one.poisson_ratio, one.youngs_modulus))))
     return rows
@@ -114,7 +114,7 @@ def _interactions(scene: Scene) -> Rows:
     rows: Rows = [("a", "b", *columns)]
     for (a, b), pair in _pairs(scene):
         same = unclamped_restitution(pair.restitution)
-        # An empty cell: no restitution has that damping; a rolling friction has to be calibrated in the other engine.
+        # Empty cells: no restitution has that damping; rolling friction must be calibrated in the other engine.
         damping = _number(same) if same > 0.0 else ""
         friction = (_number(pair.static_friction), "" if on else "0", _number(rolling))
         rows.append((a, b, _number(pair.restitution), damping, *friction))
@@ -216,7 +216,7 @@ def _conventions(scene: Scene) -> Rows:
 
 
 def _linear(scene: Scene) -> Rows:
-    """What is said of linear springs alone."""
+    """The rows that concern linear springs only."""
     if scene.contact.law == HertzMindlin.name:
         return []
     return [
@@ -232,13 +232,13 @@ def _linear(scene: Scene) -> Rows:
 
 
 def _rolling(scene: Scene) -> tuple[float, bool]:
-    """Rolling friction here, and whether anything resists rolling."""
+    """Rolling friction in our pour, and whether anything resists rolling."""
     effect = scene.effect(ROLLING)
     return float(getattr(effect, effect.amplitudes[0])), effect.on
 
 
 def _kinetic(scene: Scene) -> str:
-    """Words about kinetic friction; empty where it is the static one."""
+    """Words about kinetic friction; empty if it equals static friction."""
     effect = scene.effect(KINETIC)
     if not effect.on:
         return ""

@@ -1,7 +1,7 @@
 """A pour as VTK files (.vtu, unstructured grids) for ParaView: bodies, true shapes, member spheres, contacts, rig.
 
-Each file is a set of points with numbers at them, SI. Several moments are one file each, and a collection (.pvd) per
-kind that ParaView opens as one animation. Written by meshio, which is an optional extra.
+Each file is a set of points with numbers, in SI. Several moments give one file each, and one collection (.pvd) per kind
+of file, which ParaView opens as an animation. meshio, an optional extra, writes the files.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 Numbers = Mapping[str, npt.NDArray[Any]]
 Grid = tuple[Array, str, npt.NDArray[Any], Numbers, Numbers]
-"""Points (n, 3) [m], type of the cells, their points, numbers per point, numbers per cell."""
+"""Points (n, 3) [m], type of the cells, points of the cells, numbers per point, numbers per cell."""
 MOST = 2000
-"""Moments of one pour that are kept in memory."""
+"""Most moments of one pour that are kept in memory."""
 
 README = """\
 {title}
@@ -60,7 +60,7 @@ surfaces   {surfaces}
 
 @dataclass(frozen=True)
 class PourState:
-    """Bodies, their member spheres and contacts at one time, and where the rig's surfaces are then."""
+    """Bodies, their member spheres and contacts at one time, and the poses of the rig's surfaces then."""
 
     time: float
     """[s]."""
@@ -68,21 +68,21 @@ class PourState:
     spheres: Spheres
     contacts: Contacts
     poses: Array
-    """Of the surfaces: origin [m] and orientation wxyz, shape (k, 7)."""
+    """Poses of the surfaces: origin [m] and orientation wxyz, shape (k, 7)."""
     gate_shut: bool
     """Whether the rig is still being filled."""
 
 
 def moments(scene: Scene, seed: int, every: float | None) -> tuple[tuple[PourState, ...], Record]:
-    """Run a pour to its end: a moment each ``every`` s (to the next sample of its curves), and the last one.
+    """Run a pour to its end: a moment every ``every`` s (up to the next sample of its curves), and the last moment.
 
-    Only the last one for None. Raises CommandError for more than ``MOST`` moments.
+    With ``every`` None, only the last moment. Raises CommandError for more than ``MOST`` moments.
     """
     if every is not None and value(scene, "numerics.max_time") > MOST * every:
         raise CommandError(
             f"--every {every:g}: more than {MOST} moments of a pour of up to {scene.numerics.max_time:g} s"
         )
-    # Imported here: it loads Taichi, and a target can be named without.
+    # Imported here because it loads Taichi, which merely naming a target does not need.
     from solver import Job, run_queue
 
     found: list[PourState] = []
@@ -113,11 +113,11 @@ class Paraview(ExportTarget):
     extra = "paraview"
 
     def check(self, scene: Scene) -> None:
-        """Raise :class:`CommandError` where the library that writes VTK files is missing."""
+        """Raise :class:`CommandError` if the library that writes VTK files is missing."""
         _meshio()
 
     def write(self, folder: Path, order: ExportOrder) -> str:
-        """Pour, and write the moments of it."""
+        """Run the pour, and write its moments."""
         seen, record = moments(order.scene, order.seed, order.every)
         write_paraview(folder, record.scene, seen, order.seed, str(record.outcome))
         last = f"the last at {seen[-1].time:.4g} s"
@@ -182,7 +182,7 @@ def body_grid(scene: Scene, moment: PourState) -> Grid:
 
 
 def shape_grid(scene: Scene, moment: PourState) -> Grid:
-    """Triangles of the true shapes of all bodies in the domain, where they are."""
+    """Triangles of the true shapes of all bodies in the domain, at their places."""
     shapes = [body_triangles(body) for body in scene.bodies]
     bodies = moment.bodies
     parts = []
@@ -217,7 +217,7 @@ def contact_grid(scene: Scene, moment: PourState) -> Grid:
 
 
 def rig_grid(scene: Scene, moment: PourState) -> Grid:
-    """Triangles of the rig's surfaces where they stand, without an open gate; infinite planes end beside the rest."""
+    """Triangles of the rig's surfaces at their places, without an open gate; infinite planes end near the rest."""
     rig: Rig = scene.rig
     surfaces, parts = rig_triangles(rig), []
     for index, name in enumerate(rig.surface_names):
@@ -236,7 +236,7 @@ KINDS: dict[str, Callable[[Scene, PourState], Grid]] = {
     "contacts": contact_grid,
     "rig": rig_grid,
 }
-"""Stem of a file → what is in it."""
+"""Stem of a file → function that makes its content."""
 
 
 def _write(path: Path, grid: Grid) -> None:
@@ -251,7 +251,7 @@ def _write(path: Path, grid: Grid) -> None:
 
 
 def _wide(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Whole numbers as 32 bits, which every reader of VTK has."""
+    """Whole numbers as 32 bits, which every VTK reader supports."""
     return values.astype(np.int32) if np.issubdtype(values.dtype, np.integer) else values.astype(np.float64)
 
 
@@ -260,7 +260,7 @@ def _corners(shape: Triangles) -> Array:
 
 
 def _joined(parts: list[tuple[Array, npt.NDArray[Any], int]]) -> tuple[Array, npt.NDArray[Any], npt.NDArray[Any]]:
-    """Points, triangles renumbered, and the number that each triangle belongs to."""
+    """All points, the renumbered triangles, and the number that each triangle belongs to."""
     if not parts:
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64), np.zeros(0, dtype=np.int64)
     first = np.cumsum([0, *(len(points) for points, _, _ in parts[:-1])])

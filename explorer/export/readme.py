@@ -1,4 +1,4 @@
-"""``README.txt`` of an exported folder: how to run it, how to read it, what is not as in our solver."""
+"""``README.txt`` of an exported folder: how to run it, how to read the results, what differs from our solver."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Run an exported folder with the installed engine, and say how long its stepping loop took."""
+"""Run an exported folder with the installed engine, and report how long its stepping loop took."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LOOP = re.compile(r"Loop time of ([\d.eE+-]+) (?:s |on \d+ procs )?for (\d+) ste
 
 
 class PeerTimeout(CommandError):
-    """Another engine ran longer than it was given; it has been stopped."""
+    """Another engine exceeded its time limit; it has been stopped."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,9 @@ class PeerRun:
     version: str
     steps: int
     wall_s: float
-    """Of the stepping loop, as the engine reports it [s]."""
+    """Wall time of the stepping loop, as the engine reports it [s]."""
     setup_s: float
-    """The rest: start, reading, setting up, writing [s]."""
+    """Wall time of the rest: start, reading, setting up, writing [s]."""
     final: SphereFrame
 
 
@@ -69,7 +69,7 @@ def run_yade(folder: Path, threads: int = 1, dump_every: int = 0, limit: float |
 
 
 def installed(name: str) -> str:
-    """Path of the program ``name``; :class:`CommandError` where it is not on ``PATH``."""
+    """Path of the program ``name``; :class:`CommandError` if it is not on ``PATH``."""
     program = shutil.which(name)
     if program is None:
         raise CommandError(f"{name}: not installed (Debian: apt install {name})")
@@ -79,8 +79,8 @@ def installed(name: str) -> str:
 def _run(command: list[str], folder: Path, environment: dict[str, str], limit: float | None) -> tuple[str, float]:
     """Output and duration [s] of a program; the final state of an earlier run is removed first.
 
-    It has a process group of its own, which is killed at ``limit`` [s] and whenever this function is left early:
-    a wrapper script (YADE's) would die alone and leave its child at work.
+    The program has a process group of its own, which is killed at ``limit`` [s] and whenever this function exits early:
+    otherwise a wrapper script (YADE's) would die alone and leave its child running.
     """
     (folder / FINAL).unlink(missing_ok=True)
     name, started = Path(command[0]).name, time.perf_counter()
@@ -100,7 +100,7 @@ def _run(command: list[str], folder: Path, environment: dict[str, str], limit: f
     except subprocess.TimeoutExpired as late:
         raise PeerTimeout(f"{name}: stopped after {limit:g} s, the limit") from late
     finally:
-        # Not yet reaped, so the number is still that of this group.
+        # The process is not yet reaped, so its number still identifies this group.
         if process.returncode is None:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()

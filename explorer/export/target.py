@@ -1,4 +1,4 @@
-"""What a pour or a material can be exported to: the protocol of a target, and what it is asked for."""
+"""Targets to which a pour or a material can be exported: the protocol of a target, and the order that it gets."""
 
 from __future__ import annotations
 
@@ -11,46 +11,46 @@ from solver.scenes.scene import Scene
 
 @dataclass(frozen=True)
 class ExportOrder:
-    """What is exported, and how much of it."""
+    """What to export, and how much of it."""
 
     scene: Scene
     seed: int = 1
     time: float | None = None
-    """Simulated time of the other program's pour [s]; None: that of ours."""
+    """Simulated time of the other program's pour [s]; None: the time of ours."""
     every: float | None = None
     """Simulated time between two moments [s], for a target that takes ``every``; None: the last moment only."""
 
 
 class ExportTarget(Protocol):
-    """Another program, and what writes files for it; derive from this one.
+    """Another program, with the code that writes files for it; derive targets from this class.
 
-    The file that defines a target imports nothing that loads Taichi at its top: the page names targets, and its
-    process has none.
+    The module that defines a target must not import anything at its top that loads Taichi: the page names targets, and
+    its process never loads Taichi.
     """
 
     name: str
     what: str
-    """What it gets, in a few words: for the help of the command, and the page."""
+    """What the program gets, in a few words, for the command's help and the page."""
     pours: bool = True
     """Whether the pour runs here first."""
     of_material: bool = False
-    """Whether it takes nothing of a pour, neither its seed nor its time."""
+    """Whether it uses the material only, and neither seed nor time of a pour."""
     goes_on: bool = False
     """Whether the other program can simulate for longer than the pour that runs here."""
     options: tuple[str, ...] = ()
-    """Options of the command that not every target takes: ``every``."""
+    """Options of the command that not every target accepts: ``every``."""
     extra: str = ""
-    """Extra of this package that has to be installed for it."""
+    """Extra of this package that the target needs."""
 
     def check(self, scene: Scene) -> None:
-        """Raise :class:`CommandError`, before anything is poured, for what the target cannot take."""
+        """Raise :class:`CommandError`, before anything is poured, for what the target cannot represent."""
 
     def write(self, folder: Path, order: ExportOrder) -> str:
-        """Write the files into an existing folder; returns, in a line, what is in it."""
+        """Write the files into an existing folder; returns a line that says what it contains."""
 
 
 def described(target: ExportTarget) -> str:
-    """What a target gets and what it takes, in a line."""
+    """What a target gets and which options it accepts, in a line."""
     parts = [
         target.what,
         "the pour runs here first" if target.pours else "nothing is poured",

@@ -1,12 +1,12 @@
 """The deck for YADE 2023: ``deck.json``, ``law.json`` and a script that reads them.
 
-What makes it repeat our pour: planes and facets with ``hertzian``, so that R* is the sphere's radius; damping ratios
-instead of restitutions, betan = c_n/2 and betas = c_t/2 of our law; members that carry the body's mass, because YADE
-damps with the mass of the touching sphere; a clump whose mass and principal moments come from one sphere that touches
-nothing.
+These settings make it repeat our pour: planes and facets with ``hertzian``, so that R* is the sphere's radius; damping
+ratios instead of restitutions, betan = c_n/2 and betas = c_t/2 of our law; members that carry the body's mass, because
+YADE damps with the mass of the touching sphere; a clump whose mass and principal moments come from one sphere that
+touches nothing.
 
-What stays different: tangential springs are not scaled down while a contact unloads. A sphere on an edge between two
-facets is pushed by both. Version 2023.02a is assumed: 2019 and earlier take the mean shear modulus of a pair.
+Differences that remain: tangential springs are not scaled down while a contact unloads, and a sphere on an edge between
+two facets is pushed by both. Version 2023.02a is assumed: 2019 and earlier use the mean shear modulus of a pair.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ LAW = "law.json"
 
 
 def write_yade(folder: Path, deck: Deck) -> None:
-    """Write the deck into ``folder``; :class:`CommandError` for what YADE's law does not have."""
+    """Write the deck into ``folder``; :class:`CommandError` for anything that YADE's law lacks."""
     if deck.rolling_friction > 0.0:
         raise CommandError(f"rolling friction {deck.rolling_friction:g}: not in the deck for YADE; allowed: 0")
     if deck.law != HertzMindlin.name:

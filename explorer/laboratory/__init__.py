@@ -1,1 +1,1 @@
-"""The laboratory's side: readings become parameters of a material, and the bench is repeated on the solver."""
+"""The laboratory: readings become parameters of a material, and bench tests are repeated on the solver."""

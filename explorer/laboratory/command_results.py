@@ -1,7 +1,8 @@
-"""What the laboratory's commands give on the page: the text of the terminal, the line that repeats it, charts, files.
+"""Results of the laboratory's commands for the page: the terminal's text, the line that repeats it, charts and files.
 
-Each function does what the command of its name does, and none of them knows the page. What takes the solver (a bench
-test run on it, a pour beside a photograph) is a command in a child: the page's own process never loads the solver.
+Each function does what the command of its name does, and none of them depends on the page. Whatever needs the solver (a
+simulated bench test, a pour beside a photograph) runs as a command in a child process: the page's own process never
+loads the solver.
 """
 
 from __future__ import annotations
@@ -61,15 +62,15 @@ from solver.photograph import open_picture
 PART = "Points of every replicate; the line is the part that the modulus is taken from, drawn on to zero force."
 ON_THE_SOLVER = "What the solver's own instrument read in the course of the test."
 PLOT = "beside.png"
-"""File of the photograph beside the pour."""
+"""Name of the picture that shows the photograph beside the pour."""
 
 
 @dataclass(frozen=True)
 class CommandResult:
-    """What a command gives.
+    """The result of a command.
 
-    ``text``: as on the terminal; empty where ``tables`` (caption → rows) say it, with ``note`` below them. ``files``:
-    name → content, to be taken along. ``picture``: RGB, (height, width, 3), where there is one.
+    ``text``: as on the terminal; empty if ``tables`` (caption → rows) replace it, with ``note`` below them. ``files``:
+    name → content, to download. ``picture``: RGB, (height, width, 3), if there is one.
     """
 
     text: str
@@ -83,7 +84,7 @@ class CommandResult:
 
 @dataclass(frozen=True)
 class Ruler:
-    """What tells lengths on a photograph: mm of a pixel, or mm of the one straight bar in it; neither: in pixels."""
+    """The scale of a photograph: mm per pixel, or mm of the one straight bar in it; with neither, lengths are in px."""
 
     scale_mm: float | None = None
     reference_mm: float | None = None
@@ -96,20 +97,20 @@ class Ruler:
 
 @dataclass(frozen=True, eq=False)
 class PhotographReading:
-    """What was read off one photograph: what is shown of it, and kept as a target, is this."""
+    """What was read off one photograph: this one reading is both shown and kept as a target."""
 
     photo: str
-    """File, or a shipped one's name."""
+    """A file, or the name of a shipped photograph."""
     ruler: Ruler
     checkerboard: str | None
-    """File of a picture of one, by the same camera; None: the base line tells the lens."""
+    """File with a picture of a checkerboard by the same camera; None: the base line determines the lens."""
     order: MeasureOrder
     measured: MeasuredPhotographs
     marks: Marks = UNMARKED
 
 
 def example_rulers() -> dict[str, Ruler]:
-    """What tells lengths on the shipped photographs, by name."""
+    """The scales of the shipped photographs, by name."""
     return {name: Ruler(**known) for name, known in read_toml(photograph_scales()).items()}
 
 
@@ -125,7 +126,7 @@ def bench_result(order: LabOrder) -> CommandResult:
 
 
 def twin_result(order: LabOrder) -> CommandResult:
-    """`explorer lab --simulate` and `--bias`: beside what the readings give, what the test gives on the solver."""
+    """`explorer lab --simulate` and `--bias`: what the readings give, and what the test gives on the solver."""
     words = lab_words(order)
     said = command_output(words)
     return replace(bench_result(order), text=said, command=shlex.join(["explorer", *words]))
@@ -152,9 +153,9 @@ def lab_words(order: LabOrder) -> list[str]:
 
 
 def rig_result(scene: Scene, rig: str, values: Mapping[str, float | str], seed: int, folder: Path) -> CommandResult:
-    """`explorer simulate RIG`: a bench test of one body of ``scene``; its parameters are kept as a file in ``folder``.
+    """`explorer simulate RIG`: a bench test of one body of ``scene``, which is kept as a file in ``folder``.
 
-    ``values``: path → value (SI) of the rig's own parameters. Raises ParameterError before anything is run.
+    ``values``: path → value (SI) of the rig's own parameters. Raises ParameterError before anything runs.
     """
     source = rig_source(rig, str(kept_scene(scene, folder)))
     line = command_line(source, with_values(source.scene, dict(values)), seed)
@@ -168,11 +169,11 @@ def rig_result(scene: Scene, rig: str, values: Mapping[str, float | str], seed: 
 def photograph_reading(
     photo: str, ruler: Ruler, checkerboard: str | None = None, marks: Marks = UNMARKED
 ) -> PhotographReading:
-    """The one reading of ``photo`` (file, or a shipped one's name), its lens as the picture ``checkerboard`` tells it.
+    """The reading of ``photo`` (file or shipped name), with the lens taken from the picture ``checkerboard``.
 
-    ``marks``: what a person marked in it; a length between two of them stands in place of ``ruler``.
+    ``marks``: what a person marked in the photograph; a length between two marks replaces ``ruler``.
 
-    Raises CommandError, or PhotographError for what is no picture or no checkerboard.
+    Raises CommandError, or PhotographError if a file is not a picture or shows no checkerboard.
     """
     if marks.length_mm is not None:
         ruler = Ruler(reference_mm=marks.length_mm)
@@ -197,7 +198,7 @@ def photograph_result(read: PhotographReading) -> CommandResult:
 
 
 def compared_result(read: PhotographReading, scene: Scene, folder: Path) -> CommandResult:
-    """`explorer measure --from-simulation`: the photograph, and beside it a pour of ``scene`` read by the same fit."""
+    """`explorer measure --from-simulation`: the photograph beside a pour of ``scene`` that the same fit reads."""
     words = [*measure_words(read), "--from-simulation", str(kept_scene(scene, folder))]
     with tempfile.TemporaryDirectory() as apart:
         drawn = Path(apart) / PLOT
@@ -210,16 +211,16 @@ def compared_result(read: PhotographReading, scene: Scene, folder: Path) -> Comm
 
 
 def measured_target(read: PhotographReading, folder: Path, targets: Sequence[Target], anew: bool) -> PhotographedTarget:
-    """`explorer measure --target`: the photograph kept in ``folder`` as a target of the study of ``targets``.
+    """`explorer measure --target`: keep the photograph in ``folder`` as a target of the study with ``targets``.
 
-    ``anew``: in place of what is kept there, or else beside it. Raises CommandError, with nothing changed.
+    ``anew``: replace what is kept there instead of adding to it. If it raises CommandError, nothing has changed.
     """
     check_targets(targets)
     return keep_target(folder, read.order.pictures, read.measured, anew)
 
 
 def measure_words(read: PhotographReading) -> list[str]:
-    """The command line that reads a photograph so, without the program's name."""
+    """The command line that repeats the reading ``read``, without the program's name."""
     words = ["measure", read.photo]
     for option, length in (("--scale", read.ruler.scale_mm), ("--reference-length", read.ruler.reference_mm)):
         words += [] if length is None else [option, f"{length:g}"]
@@ -228,9 +229,9 @@ def measure_words(read: PhotographReading) -> list[str]:
 
 
 def measured_data_result(folder: Path, asked: NewCondition, brought: Brought) -> CommandResult:
-    """`explorer new measurement`: the condition ``asked`` for in ``folder``, and what the data can tell.
+    """`explorer new measurement`: write the condition ``asked`` into ``folder``; returns what the data can show.
 
-    Raises what :func:`explorer.measured.folder.write_condition` does, with nothing changed.
+    Raises what :func:`explorer.measured.folder.write_condition` raises; nothing has changed then.
     """
     words = ["explorer", *measured_data_words(folder, asked, brought)]
     found = write_condition(folder, asked, brought)
@@ -238,7 +239,7 @@ def measured_data_result(folder: Path, asked: NewCondition, brought: Brought) ->
 
 
 def measured_data_words(folder: Path, asked: NewCondition, brought: Brought) -> list[str]:
-    """The command line that makes the same of the same files, without the program's name."""
+    """The command line that does the same with the same files, without the program's name."""
     words = ["new", "measurement", folder.name, "--out", str(folder.parent), "--condition", asked.name]
     for option, given in (
         ("--study", [asked.study]),
@@ -261,13 +262,13 @@ def measured_data_words(folder: Path, asked: NewCondition, brought: Brought) -> 
 
 @dataclass(frozen=True)
 class SheetOrder:
-    """What `explorer design` is asked for beside the design: its file of factors, what it should see, kind of file."""
+    """Options of `explorer design` besides the design: factors file, the effect it should detect, kind of file."""
 
     factors: str
     sigma: float | None = None
     """Standard deviation of one run."""
     effect: float | None = None
-    """Change that it should see."""
+    """Change that the design should detect."""
     workbook: bool = False
     decimal_comma: bool = False
 
@@ -312,14 +313,14 @@ def sheet_result(order: DesignOrder, asked: SheetOrder) -> CommandResult:
 
 
 def analysis_result(order: AnalyseOrder) -> CommandResult:
-    """`explorer analyse`: what a filled sheet says."""
+    """`explorer analyse`: the analysis of a filled sheet."""
     result = run_analyse(order)
     files = {"report.html": design_html(result).encode()}
     return CommandResult(analysis_text(result), shlex.join(result.command), design_plots(result), files)
 
 
 def audit_result(folder: Path | None) -> CommandResult:
-    """`explorer audit`: a published study recomputed from its own tables; None: the shipped article."""
+    """`explorer audit`: a published study recomputed from its own tables; None for the shipped article."""
     found = audit_study(read_study(folder or shipped_study()))
     words = ["explorer", "audit", *([str(folder)] if folder else [])]
     return CommandResult(audit_text(found), shlex.join(words), {}, {"audit.html": audit_html(found).encode()})

@@ -1,7 +1,8 @@
 """Part of a material (:class:`PartFile`): measured parameters with their origin, as `explorer lab --out` writes it.
 
-`explorer new material NAME --like MATERIAL --part FILE` lays parts over a material, the page those of a bench test over
-the pour's; by hand, the tables can be copied into a material file as they are, ``[measured]`` included.
+`explorer new material NAME --like MATERIAL --part FILE` lays parts over a material; the page lays the part of a bench
+test over the material of the pour. The tables can also be copied by hand into a material file as they are,
+``[measured]`` included.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ Table = dict[str, Any]
 
 SIZES = ("size_distribution", "size_spread")
 SCATTER = "log_normal"
-"""Distribution of a measured spread, which acts only with one; as of measured diameters in a material file."""
+"""Distribution of a measured spread, which has no effect without one; as for measured diameters in a material file."""
 ELASTIC = ("youngs_modulus", "shear_modulus", "poisson_ratio")
 STARTER = "the starter material"
 
@@ -60,7 +61,7 @@ class PartFile(TomlTable):
 
 
 def part_table(result: LabResult) -> Table:
-    """The part as plain tables: parameters, and under ``measured`` their origin and what is no parameter."""
+    """The part as plain tables: parameters, and under ``measured`` their origin and whatever is not a parameter."""
     found: Table = {"format": 1}
     for one in result.derived:
         if one.parameter:
@@ -86,7 +87,7 @@ def part_text(table: Table, heading: str) -> str:
 
 
 def read_part(path: Path) -> Table:
-    """The tables of a part; ParameterError in one line for a bad one."""
+    """The tables of a part. Raises ParameterError, in one line, for a bad part."""
     table = read_toml(path)
     try:
         checked(PartFile, table)
@@ -96,9 +97,9 @@ def read_part(path: Path) -> Table:
 
 
 def write_measured_material(folder: Path, name: str, like: str | None, parts: Sequence[Path]) -> Path:
-    """Write ``NAME.toml``: ``like`` (name or file; None: the starter material) with ``parts``, of two the later.
+    """Write ``NAME.toml``: ``like`` (name or file; None: the starter material) with ``parts``; later parts win.
 
-    Raises CommandError where it exists already or a part does not fit.
+    Raises CommandError if the file exists already or a part does not fit.
     """
     path = new_path(folder, name)
     scene, measured = _base(path, like)
@@ -115,16 +116,16 @@ def write_measured_material(folder: Path, name: str, like: str | None, parts: Se
 
 
 def _base(path: Path, like: str | None) -> tuple[Scene, dict[str, Any]]:
-    """The scene to start from, and what its file says was measured."""
+    """The scene to start from, and the ``measured`` tables of its file."""
     if like is None:
         return starter_scene(path), {}
     return load_material(like), read_toml(asset_path("materials", like)).get("measured", {})
 
 
 def measured_source(present: Scene, result: LabResult, folder: Path) -> SceneSource:
-    """``present`` with the parameters of ``result``, kept in ``folder``; where each comes from stands in the file.
+    """``present`` with the parameters of ``result``, kept in ``folder`` as a file that also states their origins.
 
-    Raises CommandError where nothing in it is a parameter, and ParameterError where one does not fit the material.
+    Raises CommandError if ``result`` has no parameter, and ParameterError if one does not fit the material.
     """
     part = part_table(result)
     if not set(part) - {"format", "measured"}:
@@ -137,7 +138,7 @@ def measured_source(present: Scene, result: LabResult, folder: Path) -> SceneSou
 
 
 def with_part(scene: Scene, table: Table) -> Scene:
-    """``scene`` with the parameters of a part; they are no longer assumed. ParameterError where they do not fit."""
+    """``scene`` with the parameters of a part, no longer marked as assumed. ParameterError if they do not fit."""
     part = checked(PartFile, table)
     settings: dict[str, Any] = {}
     struck: set[str] = set()
@@ -159,7 +160,7 @@ def with_part(scene: Scene, table: Table) -> Scene:
 
 
 def _of_material(scene: Scene, name: str, entry: Table) -> dict[str, Any]:
-    """Settings of a material. Two elastic constants fix the third; of a modulus alone, ν stays as it was."""
+    """Settings of a material. Two elastic constants fix the third; with a modulus alone, ν stays as it was."""
     settings = {f"material.{name}.{key}": value for key, value in entry.items() if key != "youngs_modulus"}
     if "youngs_modulus" not in entry:
         return settings
@@ -197,7 +198,7 @@ def _of_bodies(bodies: Sequence[PartBody]) -> dict[str, Any]:
 
 
 def _with_fractions(scene: Scene, fractions: Mapping[str, float]) -> Scene:
-    """All at once: one after the other, each would scale those before it."""
+    """Set all fractions at once: set one by one, each would rescale those before it."""
     if not fractions:
         return scene
     names = [body.name for body in scene.bodies]
@@ -212,7 +213,7 @@ def _with_fractions(scene: Scene, fractions: Mapping[str, float]) -> Scene:
 
 
 def merged(one: Mapping[str, Any], other: Mapping[str, Any]) -> Table:
-    """Tables of both; where both have a value, that of ``other``."""
+    """The entries of both tables; if both have a value, that of ``other``."""
     both = dict(one)
     for key, value in other.items():
         old = both.get(key)
@@ -254,12 +255,12 @@ def _of_estimate(one: Estimate) -> Table:
 
 
 def _said(one: Derived | Estimate) -> Table:
-    """The formula, and what speaks against its value."""
+    """The formula, and notes on what speaks against its value."""
     return {"formula": one.formula} | ({"notes": list(one.notes)} if one.notes else {})
 
 
 def _origin(files: Sequence[str]) -> Table:
-    """The files by name and by what is in them."""
+    """The files by name and by the hash of their content."""
     paths = [Path(file) for file in files]
     return {"source": ", ".join(path.name for path in paths), "sha256": ", ".join(map(_digest, paths))}
 
@@ -269,7 +270,7 @@ def _digest(path: Path) -> str:
 
 
 def _finite(numbers: Mapping[str, Any]) -> Table:
-    """Without what a single replicate does not have."""
+    """The entries without those that a single replicate does not have."""
     return {key: value for key, value in numbers.items() if isinstance(value, str) or math.isfinite(value)}
 
 

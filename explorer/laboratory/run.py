@@ -22,12 +22,12 @@ from solver import ParameterError, Scene
 from solver.assets import asset_path
 
 CLOSED_FORM = ("shear", "rebound")
-"""Tests with a twin whose formula's bias is a closed form only."""
+"""Tests with a twin for which the bias of the formula exists in closed form only."""
 
 
 @dataclass(frozen=True)
 class LabOrder:
-    """What `explorer lab` was asked for; ``file`` None: only the bias of the test's formula, or a template."""
+    """The order to `explorer lab`; with ``file`` None, only for the bias of the test's formula, or for a template."""
 
     test: str
     file: str | None = None
@@ -46,7 +46,7 @@ class LabOrder:
 
 
 def run_lab(order: LabOrder, say: Callable[[str], None]) -> bool:
-    """Carry out ``order``; True if every round trip that was asked for closes. CommandError and others in one line."""
+    """Carry out ``order``; True if every requested round trip closes. Raises CommandError and others, in one line."""
     _check(order)
     if order.template:
         _template(order, say)
@@ -76,7 +76,7 @@ def run_lab(order: LabOrder, say: Callable[[str], None]) -> bool:
 
 
 def _template(order: LabOrder, say: Callable[[str], None]) -> None:
-    """The sheet of a test, into a file or as it is."""
+    """Write the empty sheet of a test into a file, or print it."""
     text = template_of(order.test)
     if order.out:
         write_whole(order.out, text)
@@ -87,7 +87,7 @@ def _template(order: LabOrder, say: Callable[[str], None]) -> None:
 
 
 def _write(order: LabOrder, result: LabResult, part: dict[str, Any]) -> None:
-    """The files that were asked for."""
+    """Write the requested files."""
     about = made_today(order.author, order.notes)
     if order.figure or order.report:
         from explorer.report.bench import bench_record, bench_report, write_curves
@@ -109,7 +109,7 @@ def part_file(result: LabResult, part: dict[str, Any]) -> str:
 
 
 def analysed(order: LabOrder) -> LabResult:
-    """What the readings that ``order`` names give."""
+    """The analysis of the readings that ``order`` names."""
     path = asset_path("laboratory", str(order.file))
     if order.test == "shear" and order.compression is not None:
         return analyse_elastic(path, asset_path("laboratory", order.compression))
@@ -125,7 +125,7 @@ def files_of(order: LabOrder) -> list[tuple[str, Path]]:
 
 
 def _check(order: LabOrder) -> None:
-    """Refuse, before any work, what cannot be carried out."""
+    """Refuse an order that cannot be carried out, before any work."""
     if order.template:
         _check_template(order)
         return
@@ -156,7 +156,7 @@ def _check(order: LabOrder) -> None:
 
 
 def _check_template(order: LabOrder) -> None:
-    """A template is made of nothing but the test's name."""
+    """Check that nothing but the test is named: a template needs nothing else."""
     others = (order.file, order.compression, order.left_out, order.figure, order.report, order.material)
     if any(others) or order.simulate or order.bias:
         raise CommandError("--template: makes an empty sheet; allowed with it: --out FILE.csv, --json")
@@ -165,7 +165,7 @@ def _check_template(order: LabOrder) -> None:
 
 
 def _scene_with(part: dict[str, Any], order: LabOrder) -> Scene:
-    """The material of the twins with what was derived."""
+    """The material of the twins with the derived parameters."""
     name = order.material or DEFAULT_MATERIAL
     try:
         return with_part(material_scene(name), part)
@@ -174,7 +174,7 @@ def _scene_with(part: dict[str, Any], order: LabOrder) -> Scene:
 
 
 def _twins(result: LabResult, scene: Scene) -> list[TwinRow]:
-    # Loads Taichi, which takes a second, and only this needs it.
+    # Importing this loads Taichi, which takes a second; nothing else here needs it.
     from explorer.laboratory.twin import twins
 
     return list(twins(result, scene))

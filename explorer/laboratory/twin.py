@@ -1,6 +1,6 @@
-"""Virtual twins: the bench test run on the solver, with the parameters that the bench test gave.
+"""Virtual twins: the bench test simulated with the parameters that the real bench test gave.
 
-A round trip closes where what comes out is within ``CLOSES`` of what was put in:
+A round trip closes if the result is within ``CLOSES`` of the input:
 
     inclined_plane        tan of the angle at which the body slides = μ
     drop                  tracked rebound (v_x + v_z)/√(2gH) = e
@@ -9,9 +9,9 @@ A round trip closes where what comes out is within ``CLOSES`` of what was put in
     compression, shear    E* and G* of the contact by Hertz and Mindlin, and E and G of the specimen from them:
                           1/E* = (1 − ν²)/E + (1 − ν_w²)/E_w,  1/G* = (2 − ν)/G + (2 − ν_w)/G_w
 
-Where the paper's formula is applied to the same simulated test (L/2H, Equation 1), what it misses by is shown and
-closes nothing; :func:`simulated_bias` puts it beside its closed form (``doe/laboratory/bias.py``). From the drop, the
-twin also finds the e with which a ball of the body's mass lands where the laboratory's bodies did.
+Where the paper's formula is applied to the same simulated test (L/2H, Equation 1), its error is shown, but does not
+count as a round trip; :func:`simulated_bias` compares it with its closed form (``doe/laboratory/bias.py``). From the
+drop, the twin also finds the e with which a ball of the body's mass lands where the laboratory's bodies did.
 """
 
 from __future__ import annotations
@@ -36,17 +36,17 @@ from solver.single_body.bench import UPRIGHT, ball
 from solver.single_body.inclined_plane import onset, rebound_height
 
 TILT_RATE = 5.0
-"""Of the inclined plane [°/s]; the angle moves by less than a hundredth of a degree against the rig's own 1 °/s."""
+"""Tilt rate of the plane [°/s]; the angle is within a hundredth of a degree of that at the rig's own 1 °/s."""
 DROP_HEIGHT = 0.2
-"""Of a twin whose readings tell none [m]."""
+"""Drop height of a twin whose readings state none [m]."""
 LOWEST, HIGHEST = 0.05, 1.0
-"""Restitutions that the solver takes."""
+"""Range of restitutions that the solver accepts."""
 FIRST_READING = 0.02
-"""The twin's squeezing is shown from this share of its largest strain on: before, few steps fell into a reading."""
+"""The twin's squeezing is shown from this share of its largest strain on: below, a reading covers too few steps."""
 
 
 def twins(result: LabResult, scene: Scene) -> Iterator[TwinRow]:
-    """Rows of every component or pair of ``result``, in whose ``scene`` its parameters stand already."""
+    """Rows of every component or pair of ``result``, whose parameters must already be set in ``scene``."""
     for of in dict.fromkeys(one.of for one in result.derived):
         own = {one.name: one for one in result.derived if one.of == of}
         if result.test == "inclined_plane":
@@ -102,14 +102,14 @@ def _rolling(of: tuple[str, ...], friction: float, scene: Scene) -> TwinRow:
 
 
 def _round_trip(of: tuple[str, ...], name: str, put_in: float, simulated: float) -> TwinRow:
-    """What was measured is what was put in."""
+    """A row whose measured value is also the input."""
     closes = abs(simulated - put_in) <= CLOSES * put_in
     return TwinRow(of, name, "1", put_in, put_in, simulated, closes)
 
 
 def restitution_that_lands(bench: Scene, measured: float) -> float | None:
-    """The e with which the ball of the drop rig gives L/(2H) = ``measured``; None if no e that is allowed does."""
-    # Only here: the drop alone, without the study beside it.
+    """The e with which the ball of the drop rig gives L/(2H) = ``measured``; None if no allowed e does."""
+    # Imported only here: the drop alone, without the rest of the study.
     from solver.single_body.drop_plate_45 import drop, paper_estimate
 
     gravity, height = math.hypot(*bench.gravity), bench.rig.drop_height  # type: ignore[attr-defined]
@@ -143,7 +143,7 @@ def _moduli(of: tuple[str, ...], own: dict[str, Derived], scene: Scene) -> Itera
 
 
 def specimen_moduli(found: BenchResult, material: Material, plate: Material) -> dict[str, float]:
-    """E and G of the specimen [Pa] from the moduli of the contact, with its ν and the plate's constants known."""
+    """E and G of the specimen [Pa] from the moduli of the contact, given its ν and the plate's constants."""
     e_star, g_star = (found.quantity(f"effective_{kind}_modulus").value for kind in ("youngs", "shear"))
     e_rest = 1.0 / e_star - (1.0 - plate.poisson_ratio**2) / plate.youngs_modulus
     g_rest = 1.0 / g_star - (2.0 - plate.poisson_ratio) / plate.shear_modulus
@@ -154,7 +154,7 @@ def specimen_moduli(found: BenchResult, material: Material, plate: Material) -> 
 
 
 def _closing(of: tuple[str, ...], name: str, unit: str, own: Derived | None, found: BenchResult) -> TwinRow:
-    """What the twin measured beside what was put in; a number that could not be measured closes nothing."""
+    """A row with the twin's result and its input; a quantity that could not be measured does not close."""
     quantity = found.quantity(name)
     closes = quantity.error is not None and abs(quantity.error) <= CLOSES
     measured = None if own is None else own.summary.mean
@@ -162,7 +162,7 @@ def _closing(of: tuple[str, ...], name: str, unit: str, own: Derived | None, fou
 
 
 def simulated_bias(test: str, scene: Scene, of: tuple[str, ...]) -> BiasTable:
-    """What the formula of ``test`` gives on the solver for one component or pair; CommandError where none is built."""
+    """The bias of the formula of ``test``, simulated for one component or pair. CommandError if no twin shows it."""
     if test == "drop":
         return _drop_bias(run_bench_test(bench_scene(scene, test, of)), "-".join(of))
     if test == "compression":
@@ -189,7 +189,7 @@ def _drop_bias(found: BenchResult, name: str) -> BiasTable:
 def _compression_bias(found: BenchResult, scene: Scene, of: tuple[str, ...]) -> BiasTable:
     series = {key: np.array(values) for key, values in found.series}
     material = scene.material(next(b for b in scene.bodies if of[0] in (b.name, b.material)).material)
-    # The largest approach belongs to the largest strain: their ratio is the thickness, also of a last step too many.
+    # The largest approach belongs to the largest strain: their ratio is the thickness, even with one step too many.
     strain = series["approach_m"] * (STRAINS[-1] / series["approach_m"][-1])
     ratio = series["youngs_modulus_paper_equation_1_Pa"] / material.youngs_modulus
     shown = [wanted for wanted in STRAINS if wanted >= FIRST_READING * STRAINS[-1]]
@@ -207,15 +207,15 @@ def _compression_bias(found: BenchResult, scene: Scene, of: tuple[str, ...]) -> 
 
 
 def bench_scene(scene: Scene, test: str, of: tuple[str, ...]) -> Scene:
-    """``scene`` with the rig of ``test``, the specimen of ``of`` on it, and the partner's material as its surface."""
+    """``scene`` with the rig of ``test``, the specimen named by ``of``, and its partner's material as the surface."""
     body, wall = specimen(scene, of)
-    # A ball, or a body that slides without turning: what is measured does not hang on how many spheres stand for it.
+    # A ball, or a body that slides without turning: the result does not depend on how many spheres represent it.
     rig_scene = with_rig(with_values(scene, {"body.spheres": "coarse"}), RIGS[test])
     return dataclasses.replace(rig_scene, rig=dataclasses.replace(rig_scene.rig, body=body.name, wall=wall))  # type: ignore[type-var]
 
 
 def specimen(scene: Scene, of: tuple[str, ...]) -> tuple[Body, str]:
-    """The body that is tested and the material that it lies on; of one component alone, the wall's."""
+    """The body under test and the material that it lies on, which is the wall's if only one component is named."""
     bodies = {name: body for body in reversed(scene.bodies) for name in (body.material, body.name)}
     one, other = of if len(of) == 2 else (of[0], scene.rig.wall)
     if not {*of} & {*bodies}:

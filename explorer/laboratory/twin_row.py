@@ -1,4 +1,4 @@
-"""What a virtual twin returns, and which tests have one; nothing here loads the solver."""
+"""The result of a virtual twin, and which tests have one; nothing here loads the solver."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from doe.record import Record
 from explorer.errors import CommandError
 
 CLOSES = 0.01
-"""Largest relative deviation of a round trip that closes."""
+"""Largest relative deviation at which a round trip closes."""
 RIGS = {
     "inclined_plane": "inclined_plane",
     "drop": "drop_plate_45",
@@ -18,21 +18,21 @@ RIGS = {
     "compression": "compression",
     "shear": "compression",
 }
-"""Rig of each test that has a twin; a rebound is on the plane while it is level."""
+"""Rig of each test that has a twin; a rebound is run on the plane while it is level."""
 LIKE = {
     "bulk_density": "explorer simulate lifting_cylinder (bulk_density_kg_m3, solid_fraction of the pile)",
     "drum": "explorer simulate rotating_drum (dynamic_angle_deg)",
     "draw_down": "explorer simulate draw_down_box (draw_down_angle_deg, angle_of_repose_deg@0, discharge)",
 }
-"""Command that simulates the like of a test without a twin, with a whole material in place of what the test gave."""
+"""For a test without a twin: the command that simulates a similar test, with a whole material instead of its result."""
 
 
 @dataclass(frozen=True)
 class TwinRow(Record):
-    """One quantity of one twin, SI; None where there is none.
+    """One quantity of one twin, SI; None for a missing value.
 
-    error: simulated over what was put in, less one; over what was measured where nothing was put in. closes: whether
-    the round trip does, None for a row that shows a bias.
+    error: simulated over put_in, minus one; over measured if nothing was put in. closes: whether the round trip closes;
+    None for a row that shows a bias.
     """
 
     of: tuple[str, ...]

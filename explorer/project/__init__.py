@@ -1,1 +1,1 @@
-"""A project: one granular material from its file to its report, as a folder, and how far each step of it is."""
+"""A project: one granular material from its file to its report, as a folder, with the progress of each step."""

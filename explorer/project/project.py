@@ -1,11 +1,11 @@
-"""A project as a folder: ``project.toml`` names its study and its measured data; results stand beside it.
+"""A project as a folder: ``project.toml`` names its study and its measured data; results lie beside it.
 
 format = 1
 title = "Lentils, lot 7"
 study = "lentil_study.toml"     # relative to this file; it names the material
 measured = "measured"           # folder with measurement.toml, for the diagnosis; may be left out
 
-Photographs that were made its target are kept in the folder ``target``.
+Photographs that serve as its target are kept in the folder ``target``.
 """
 
 from __future__ import annotations
@@ -50,43 +50,43 @@ class Project:
     study: Path
     """The study file, which names the material."""
     source: SceneSource
-    """What is poured first."""
+    """The first scene to pour."""
     results: Path
     """Folder in which studies and diagnoses leave their results."""
     measured: Path | None = None
     """Folder of measured data for the diagnosis."""
     folder: Path | None = None
-    """Of ``project.toml``; None for a material or a study without one."""
+    """Folder of ``project.toml``; None for a material or a study without one."""
 
     @property
     def studies(self) -> Path:
-        """Output folders of the project's studies are made in here."""
+        """Folder for the output folders of the project's studies."""
         return self.results / "studies"
 
     @property
     def diagnoses(self) -> Path:
-        """Output folders of the project's diagnoses are made in here."""
+        """Folder for the output folders of the project's diagnoses."""
         return self.results / "diagnoses"
 
     @property
     def target(self) -> Path:
-        """Folder of the photographs that are its measured target, where there are any (`explorer.photograph.target`).
+        """Folder of the photographs that are its measured target, if there are any (`explorer.photograph.target`).
 
-        Studies of the same name from several places share the folder of results, but no target.
+        Studies of the same name in different places share the folder of results, but not the target.
         """
         place = hashlib.sha256(str(self.study.absolute()).encode()).hexdigest()[:8]
         return (self.folder or self.results / "targets" / f"{self.study.stem}-{place}") / FOLDER
 
     @property
     def laboratory(self) -> Path:
-        """Reports of the laboratory are kept in here, in a folder each."""
+        """Folder for the laboratory's reports, each in a folder of its own."""
         return self.results / "laboratory"
 
     @property
     def reports(self) -> tuple[Path, ...]:
         """Folders of this project that hold a report, newest first."""
         places = [self.results.glob(f"*/*/{REPORT}")]
-        if self.folder is not None:  # what commands left beside its results
+        if self.folder is not None:  # reports that commands left beside the results
             places += [self.folder.glob(f"{deep}{REPORT}") for deep in ("*/", "*/*/")]
         found = {file.parent.resolve(): file.stat().st_mtime for place in places for file in place}
         return tuple(sorted(found, key=lambda folder: found[folder], reverse=True))
@@ -95,7 +95,7 @@ class Project:
 def new_project(folder: Path, material: str | None = None) -> list[Path]:
     """Write a project into the new ``folder``: a starter material (or ``material``, by path or shipped name) and study.
 
-    Returns what was written, ``project.toml`` last. Raises CommandError where the folder holds a project already.
+    Returns the files written, ``project.toml`` last. Raises CommandError if the folder already holds a project.
     """
     file = folder / FILE
     if file.exists():
@@ -133,16 +133,16 @@ def load_project(folder: Path) -> Project:
 
 
 def study_project(study: str) -> Project:
-    """A project of a study alone, by its path or shipped name; results go into the user's data folder."""
+    """A project for a study alone, by its path or shipped name; results go into the user's data folder."""
     file = study_path(study)
     return Project(_words(file.stem.removesuffix(STUDY_ENDING)), file, study_source(file), data_folder())
 
 
 def material_project(material: str) -> Project:
-    """A project of a material alone, by its path or shipped name.
+    """A project for a material alone, by its path or shipped name.
 
-    Its study is ``<material>_study.toml`` beside it where there is one; otherwise one with an example target is written
-    into the user's data folder, anew each time, since its factors are read off the material.
+    Its study is ``<material>_study.toml`` beside it, if there is one. Otherwise a study with an example target is
+    written into the user's data folder, each time again, because its factors are read off the material.
     """
     source = material_source(material)
     own = Path(source.material)

@@ -53,11 +53,11 @@ class Step:
     hint: str
     """What the step is, in a sentence."""
     room: Room
-    """Where it is done."""
+    """Tab in which the step is done."""
 
 
 STOPPED = "stopped with an error"
-"""What is said of a command that broke off."""
+"""Text for a command that broke off."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Finished:
 
 
 def material_step(scene: Scene) -> Step:
-    """Of the material: how many of its values are assumed."""
+    """The step of the material: how many of its values are assumed."""
     n = len(scene.assumed)
     state, said = (StepState.ASSUMED, f"{n} assumed") if n else (StepState.MEASURED, "")
     return Step(
@@ -81,10 +81,10 @@ def material_step(scene: Scene) -> Step:
 
 
 def measured_step(targets: Sequence[Target], photographed: PhotographedTarget | None = None) -> Step:
-    """Of the measured pile: the photographs that were made the target, or the first target of the study."""
+    """The step of the measured pile: the photographs that serve as the target, or the study's first target."""
     hint = "What was measured in the laboratory: the target of the calibration."
     if photographed is not None:
-        # One pile says nothing of how piles differ.
+        # One pile says nothing about how piles differ.
         state = StepState.MEASURED if photographed.n > 1 else StepState.ASSUMED
         return Step("Measured", state, photographed.short, f"{hint} {photographed.line}", Room.LABORATORY)
     if not targets:
@@ -99,7 +99,7 @@ def measured_step(targets: Sequence[Target], photographed: PhotographedTarget | 
 
 
 def pour_step(status: Status) -> Step:
-    """Of the live pour."""
+    """The step of the live pour."""
     hint = "The pour in the scene: one pile of this material."
     if status.state in (SessionState.FAILED, SessionState.DIED):
         return Step("Pour", StepState.FAILED, "solver stopped", hint, Room.POUR)
@@ -113,7 +113,7 @@ def pour_step(status: Status) -> Step:
 
 
 def command_step(name: str, hint: str, room: Room, status: CommandStatus, finished: Finished | None) -> Step:
-    """Of a calibration or a diagnosis, whose process is in ``status``; ``finished``: the newest result."""
+    """The step of a calibration or a diagnosis: ``status`` of its process, and its newest ``finished`` result."""
     if status.alive:
         share = f"{status.done / status.planned:.0%}" if status.planned else ""
         return Step(name, StepState.RUNNING, "paused" if status.state == "paused" else share, hint, room)
@@ -125,14 +125,14 @@ def command_step(name: str, hint: str, room: Room, status: CommandStatus, finish
 
 
 def report_step(results: Sequence[Finished | None]) -> Step:
-    """Of the report: there is one where a result has left it."""
+    """The step of the report: done as soon as a result has a report."""
     n = sum(1 for one in results if one is not None and one.report)
     state = StepState.DONE if n else StepState.EMPTY
     return Step("Report", state, "", "What was done and found, as a page to read, print and send.", Room.REPORTS)
 
 
 def next_step(steps: Sequence[Step]) -> tuple[str, Room]:
-    """What to do next, in a sentence, and where."""
+    """What to do next, in a few words, and in which tab."""
     by_name = {step.name: step for step in steps}
     measured, calibrate, diagnose = (by_name[name] for name in ("Measured", "Calibrate", "Diagnose"))
     for step in (calibrate, diagnose):

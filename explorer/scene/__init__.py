@@ -1,1 +1,1 @@
-"""Scenes as people name, change, draw and write them."""
+"""Naming, changing, drawing and writing scenes."""

@@ -1,4 +1,4 @@
-"""From what a person names on the command line to a scene: a rig, material, study or calibration, settings on top.
+"""From a name on the command line to a scene: a rig, material, study or calibration, with settings on top.
 
 A file with ``material`` but neither targets nor factors is a set-up: its tables ``[rig]``, ``[insertion]``,
 ``[numerics]`` and ``[effect.<name>]`` lie over the material (``solver/scenes/material_file.py``), as they may in a
@@ -28,7 +28,7 @@ from solver.shapes.solid import ShapeError
 DEFAULT_MATERIAL = "sunflower_extract"
 DEFAULT_STUDY = "sunflower_extract"
 SHIPPED: tuple[AssetKind, ...] = ("materials", "studies", "benchmarks", "scenes")
-"""Where a shipped name is looked for, in this order."""
+"""Where a shipped name is looked up, in this order."""
 
 SET_UP_KEYS = ("format", "title", "material", *SET_UP)
 
@@ -36,7 +36,7 @@ SOURCES = (*RIGS, *BENCH_RIGS)
 """Rigs that can be named on the command line."""
 RESULT = "result.json"
 WRONG = (ParameterError, AssetNotFoundError, ShapeError)
-"""What the contents of a file can raise."""
+"""Exceptions that the contents of a file can raise."""
 
 
 def load_scene(source: str, material: str | None = None) -> Scene:
@@ -44,14 +44,14 @@ def load_scene(source: str, material: str | None = None) -> Scene:
 
     Args:
         source: a rig ("funnel", "rotating_drum"), or a material, set-up or study by the path of its file or its
-            shipped name (shipped set-ups are benchmarks). Where a material and a study share a shipped name, it means
-            the material.
+            shipped name (shipped set-ups are benchmarks). If a material and a study share a shipped name, the name
+            means the material.
         material: path or shipped name of the material in the rig; only a rig takes one.
 
     Raises:
         ParameterError, AssetNotFoundError: one line with file, key, value and what is allowed.
 
-    A rig with its default dimensions is not checked against the bodies: :func:`with_settings` does that.
+    A rig with its default dimensions is not checked against the bodies here: :func:`with_settings` does that.
     """
     if source in SOURCES:
         scene = material_scene(material or DEFAULT_MATERIAL)
@@ -69,7 +69,7 @@ def load_scene(source: str, material: str | None = None) -> Scene:
 
 
 def named_scene(source: str, material: str | None = None) -> tuple[Scene, str]:
-    """The scene of :func:`load_scene`, or of the folder of a calibration with its caution: :func:`calibrated_scene`."""
+    """The scene from :func:`load_scene`, or for a calibration's folder :func:`calibrated_scene` with its caution."""
     if material is None and is_calibration(source):
         return calibrated_scene(source)
     return load_scene(source, material), ""
@@ -123,7 +123,7 @@ def study_path(study: str) -> Path:
 
 
 def with_settings(scene: Scene, settings: Sequence[str]) -> Scene:
-    """``scene`` with settings ``path=value`` (``rig.mass=12g``); of two for one path the last counts."""
+    """``scene`` with settings ``path=value`` (``rig.mass=12g``); if a path is set twice, the last setting counts."""
     values: dict[str, Any] = {}
     for setting in settings:
         path, equals, value = setting.partition("=")
@@ -143,13 +143,13 @@ def is_calibration(source: str) -> bool:
 
 
 def calibrated_scene(source: str) -> tuple[Scene, str]:
-    """The scene at the optimum of the calibration in folder ``source``, and a caution; empty where none is due.
+    """The scene at the optimum of the calibration in folder ``source``, and a caution, which may be empty.
 
-    It is due where the surface is not better than noise, and where the target leaves factors open: their values are
-    then chosen by rule, and the ranges that give the target are told.
+    A caution is due if the surface is not better than noise, or if the target leaves factors open: their values are
+    then chosen by rule, and the caution states the ranges that give the target.
 
-    Raises CommandError for a result that is not one of `explorer calibrate`, ParameterError or AssetNotFoundError where
-    its study is not there any more or has changed so that the optimum does not fit it.
+    Raises CommandError for a result that is not from `explorer calibrate`, and ParameterError or AssetNotFoundError if
+    its study no longer exists or has changed so that the optimum does not fit it.
     """
     path = own_path(source) / RESULT
     try:

@@ -1,4 +1,4 @@
-"""A grain by its shape, sizes, density and friction, in the starter material of `explorer new material`."""
+"""A grain given by its shape, sizes, density and friction, in the starter material of `explorer new material`."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ SHAPES: dict[str, tuple[Kind, tuple[str, ...]]] = {
     "plate (box)": ("box", ("Length", "Width", "Thickness")),
     "rod (cylinder)": ("cylinder", ("Diameter", "Length")),
 }
-"""Shape → solid and its full lengths, in their order."""
+"""Shape → solid and the names of its full lengths, in order."""
 DENSITY, FRICTION, WALL_FRICTION = (
     "material.grain.density",
     "pair.grain.grain.static_friction",
     "pair.grain.steel.static_friction",
 )
-"""Paths of what a grain says of the starter material."""
+"""Paths of the parameters of the starter material that a grain sets."""
 ASSUMED_AS = {DENSITY: "materials.grain.density"}
-"""Path → how it stands among what is assumed, where that is another."""
+"""Path → its name in the list of assumed values, if that differs."""
 SHAPE = "body.grain.shape"
 
 
@@ -36,20 +36,21 @@ class Grain:
     shape: str
     """One of ``SHAPES``."""
     lengths: tuple[float, ...]
-    """In the order of its shape [m]."""
+    """Full lengths [m], in the order of ``SHAPES``."""
     density: float
-    """Of one grain [kg/m³]."""
+    """Density of one grain [kg/m³]."""
     friction: float
-    """Static, grain on grain."""
+    """Static friction, grain on grain."""
     wall_friction: float
-    """Static, grain on funnel and plate."""
+    """Static friction, grain on funnel and plate."""
     number: int
 
 
 def grain_scene(grain: Grain) -> Scene:
-    """The starter material with ``grain`` for its body, and as much of it as ``grain.number`` weigh.
+    """The starter material with ``grain`` as its body; the poured mass is that of ``grain.number`` grains.
 
-    What differs from the starter is no longer listed as assumed. Raises ShapeError or ParameterError in one line.
+    Values that differ from the starter are no longer listed as assumed. Raises ShapeError or ParameterError, in one
+    line.
     """
     starter = starter_scene(Path(f"{grain.name}.toml"))
     body = replace(starter.bodies[0], shape=Solid(SHAPES[grain.shape][0], grain.lengths))
@@ -62,7 +63,7 @@ def grain_scene(grain: Grain) -> Scene:
 
 
 def write_grain(folder: Path, grain: Grain) -> Path:
-    """Write ``NAME.toml`` into ``folder``; CommandError if it exists or the name is not allowed."""
+    """Write ``NAME.toml`` into ``folder``. Raises CommandError if the file exists or the name is not allowed."""
     path = new_path(folder, grain.name)
     lengths = " × ".join(f"{1e3 * length:.4g}" for length in grain.lengths)
     heading = f"{grain.name}: {grain.shape}, {lengths} mm. SI; what nobody has measured yet stands under assumed."

@@ -1,10 +1,10 @@
-"""A pour as text in an address: the scene by shipped name, what differs from it, the seed and a moment.
+"""A pour as text in an address: the scene by its shipped name, the changed parameters, the seed and a moment.
 
     pour=sunflower_extract&set=pair.seed.seed.static_friction%3D0.4&seed=1&time=1.25
     pour=funnel&material=glass_beads&seed=3&time=0.5
 
-It names no file: a scene is shipped, or the one that the program was started with, which is then told by a checksum,
-and a parameter that is a file is refused, in writing and in reading.
+The text names no file: a scene is shipped, or is the one that the program was started with, which a checksum then
+identifies. A parameter whose value is a file is refused, in writing and in reading.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from solver.scenes.material_file import with_settings
 from solver.scenes.scene import Scene, canonical, check, parameters
 
 LONGEST = 2000
-"""Characters of an address that every browser, mail and chat leaves whole."""
+"""Most characters of an address that every browser, mail and chat program leaves intact."""
 LARGEST_SEED = 2**31 - 1
 LONGEST_POUR = 1000.0
-"""Latest moment [s]."""
+"""Latest moment that a link may ask for [s]."""
 INSTEAD = "take the command line or Scene (TOML) under Export"
 
 
@@ -39,13 +39,13 @@ class LinkedPour:
     scene: Scene
     seed: int
     moment: float
-    """Simulated time [s] up to which it is poured."""
+    """Simulated time [s] up to which to pour."""
 
 
 def pour_text(source: SceneSource, scene: Scene, seed: int, begun: SceneSource) -> str:
-    """The text of a pour, without a moment. ``begun``: what the program was started with.
+    """The text of a pour, without a moment. ``begun``: the source that the program was started with.
 
-    Raises CommandError where no such text leads to ``scene``.
+    Raises CommandError if no such text leads to ``scene``.
     """
     fields, changed = _named(source, begun), settings(source, scene)
     _refuse_files(source.scene, changed)
@@ -53,7 +53,7 @@ def pour_text(source: SceneSource, scene: Scene, seed: int, begun: SceneSource) 
 
 
 def read_pour(text: str, begun: SceneSource) -> LinkedPour:
-    """What ``text`` asks for; it may be anything. Raises a ValueError of one line for what is not allowed."""
+    """The pour that ``text``, which may be anything, asks for. ValueError in one line if it is not allowed."""
     if len(text) > LONGEST:
         raise CommandError(f"link: {len(text)} characters; allowed: up to {LONGEST}")
     fields = parse_qsl(text)
@@ -79,7 +79,7 @@ def _named(source: SceneSource, begun: SceneSource) -> list[tuple[str, str]]:
 
 
 def _source(name: str, material: str | None, begun: SceneSource) -> SceneSource:
-    """What the fields name; never a file."""
+    """The source that the fields name; never a file."""
     if material is not None:
         if name in SOURCES and material in shipped_assets("materials"):
             return rig_source(name, material)
@@ -105,7 +105,7 @@ def _table(texts: Sequence[str]) -> dict[str, str]:
 
 
 def _refuse_files(scene: Scene, texts: Sequence[str]) -> None:
-    """Raise CommandError where a setting names a file; asked before any of them is read."""
+    """Raise CommandError if a setting names a file; called before any of them is read."""
     table = _table(texts)
     if (rig := table.pop("rig.name", None)) is not None:
         scene = with_settings(scene, {"rig.name": rig})
@@ -116,7 +116,7 @@ def _refuse_files(scene: Scene, texts: Sequence[str]) -> None:
 
 
 def _number(given: Mapping[str, str], key: str, high: float) -> float:
-    """A number from 0 to ``high``; 0 where there is none."""
+    """A number from 0 to ``high``; 0 if there is none."""
     try:
         number: object = float(given.get(key, "0"))
     except ValueError:

@@ -1,4 +1,4 @@
-"""Triangles to draw: the true shapes of bodies in their own frame, and the rig. NumPy and trimesh only."""
+"""Triangles to draw: the true shapes of bodies in their own frame, and the rig. Needs NumPy and trimesh only."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from solver.scenes.scene import Scene, pour_rig
 from solver.shapes.solid import surface_mesh
 
 SIDES = 96
-"""Corners of a circle."""
+"""Corners of the polygon that represents a circle."""
 PLATE_NAME = "plate"
 """The surface that bodies pile up on."""
 GATE_NAME = "gate"
-"""The surface that is there only until the rig acts."""
+"""The surface that exists only until the rig acts."""
 PLATE_OVERHANG = 2.0
 """Radius at which the infinite plate is drawn, as a multiple of the largest radius of the rest of the rig."""
 BARE_SQUARE = np.array([(-0.05, -0.05, -0.05), (0.05, 0.05, 0.05)])
-"""Where nothing but planes is there, they are drawn this far [m]."""
+"""Extent to which planes are drawn if there is nothing else [m]."""
 
 Array = npt.NDArray[np.float64]
 
@@ -39,7 +39,7 @@ class Triangles:
 
 
 def body_triangles(body: Body) -> Triangles:
-    """The true shape in the principal frame of the body; the member spheres where it is declared by nothing else."""
+    """The true shape in the principal frame of the body; its member spheres if nothing else declares the shape."""
     if isinstance(body.shape, Members):
         if body.shape.drawn is not None:
             return _faceted(surface_mesh(body.shape.drawn))
@@ -53,7 +53,7 @@ def body_triangles(body: Body) -> Triangles:
 
 
 def rig_triangles(rig: Rig) -> dict[str, Triangles]:
-    """The surfaces of ``rig`` by name, each in its own frame; :func:`rig_poses` says where that is in the world."""
+    """The surfaces of ``rig`` by name, each in its own frame; :func:`rig_poses` gives these frames in the world."""
     surfaces = rig.surfaces()
     corners = [_in_world(surface, _finite(surface).vertices) for surface in surfaces if not isinstance(surface, Plane)]
     reach = np.concatenate(corners) if corners else BARE_SQUARE
@@ -64,7 +64,7 @@ def rig_triangles(rig: Rig) -> dict[str, Triangles]:
 
 
 def rig_poses(rig: Rig) -> Array:
-    """Where the surfaces of ``rig`` are before it acts, in order: origin [m] and orientation wxyz, shape (k, 7)."""
+    """Poses of the surfaces of ``rig`` before it acts, in order: origin [m] and orientation wxyz, shape (k, 7)."""
     return np.array([(*surface.pose.origin, *surface.pose.quaternion) for surface in rig.surfaces()])
 
 
@@ -90,7 +90,7 @@ def scene_height(scene: Scene) -> float:
 
 
 def outlet_height(rig: Rig) -> float:
-    """Height of the lowest rim of a shell before ``rig`` acts [m]; 0 where it has none: what it feeds lies below."""
+    """Height of the lowest rim of a shell before ``rig`` acts [m]; 0 if there is none. What it feeds lies below."""
     rims = rim_circles(rig)
     rings = [
         _in_world(surface, np.array([(r, 0.0, z), (-r, 0.0, z), (0.0, r, z), (0.0, -r, z)]))[:, 2].min()
@@ -125,7 +125,7 @@ def _finite(surface: Revolved | TriangleMesh) -> Triangles:
 
 
 def _revolved(surface: Revolved) -> Triangles:
-    """Two circles and the strip between them; normals across the line, towards the axis or upward."""
+    """Two circles and the strip between them; normals perpendicular to the profile line, towards the axis or upward."""
     angle = np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)
     circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(SIDES)], axis=1)
     up = np.array([0.0, 0.0, 1.0])

@@ -21,7 +21,7 @@ from solver.toml_file import TomlTable, checked, read_toml
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,39}")
 OWN_MARK = " (own)"
-"""Behind the name of a user's preset in a list."""
+"""Suffix of the name of a user's preset in a list."""
 MOST_BYTES = 100_000
 
 
@@ -46,13 +46,13 @@ class Preset:
 
 
 def preset_names(folder: Path) -> tuple[str, ...]:
-    """What can be chosen: the shipped presets, then those in ``folder``, marked as the user's own."""
+    """The presets on offer: the shipped ones, then those in ``folder``, marked as the user's own."""
     own = sorted(path.stem for path in folder.glob("*.toml")) if folder.is_dir() else []
     return (*shipped_assets("presets"), *(f"{name}{OWN_MARK}" for name in own))
 
 
 def preset_path(name: str, folder: Path) -> Path:
-    """The file of one of :func:`preset_names`; CommandError for a name that is not among them."""
+    """The file of one of :func:`preset_names`. Raises CommandError for any other name."""
     if name not in preset_names(folder):
         raise CommandError(f"preset {name[:60]!r}: no such preset")
     own = name.removesuffix(OWN_MARK)
@@ -60,7 +60,7 @@ def preset_path(name: str, folder: Path) -> Path:
 
 
 def read_preset(path: Path) -> Preset:
-    """The preset in ``path``; ParameterError in one line naming file, key and what is allowed."""
+    """The preset in ``path``. Raises ParameterError, in one line that names file, key and what is allowed."""
     if path.is_file() and path.stat().st_size > MOST_BYTES:
         raise ParameterError(f"{path}: {path.stat().st_size} bytes; allowed: up to {MOST_BYTES}")
     table = read_toml(path)
@@ -72,7 +72,7 @@ def read_preset(path: Path) -> Preset:
 
 
 def preset_values(preset: Preset, scene: Scene) -> dict[str, float | str]:
-    """Values for ``scene`` by path, each checked; later lines of the file count over earlier ones.
+    """Values for ``scene`` by path, each checked; later lines of the file override earlier ones.
 
     Raises ParameterError for a path that the scene does not have and for a value that is not allowed.
     """
@@ -87,9 +87,9 @@ def preset_values(preset: Preset, scene: Scene) -> dict[str, float | str]:
 
 
 def save_preset(name: str, folder: Path, changed: Iterable[Difference]) -> Path:
-    """Write what differs from the default as the preset ``name``; one of that name is replaced.
+    """Write what differs from the default as the preset ``name``; an existing preset of that name is replaced.
 
-    Raises CommandError for a name that is not allowed, and where nothing differs.
+    Raises CommandError for a name that is not allowed, and if nothing differs.
     """
     if not NAME.fullmatch(name):
         raise CommandError(f"preset {name[:60]!r}: up to 40 letters, digits, blanks, - and _ are allowed")
@@ -104,7 +104,7 @@ def save_preset(name: str, folder: Path, changed: Iterable[Difference]) -> Path:
 
 
 def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Entries by path, whether a path is one quoted key or tables within tables."""
+    """Entries by path, whether a path is written as one quoted key or as nested tables."""
     found: dict[str, Any] = {}
     for key, entry in table.items():
         path = f"{prefix}{key}"

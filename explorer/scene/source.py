@@ -18,19 +18,19 @@ from solver.toml_file import read_toml
 
 PROGRAM = ("explorer", "simulate")
 PLURALS = {"body": "bodies"}
-"""Of the first word of a parameter's path, where it is more than an s."""
+"""Plurals of the first word of a parameter's path, if they need more than an s."""
 
 
 @dataclass(frozen=True)
 class SceneSource:
-    """What ``explorer simulate`` is told to load a scene."""
+    """The arguments with which ``explorer simulate`` loads a scene."""
 
     arguments: tuple[str, ...]
-    """Before any setting; empty: the scene came from no file."""
+    """Arguments before any setting; empty if the scene came from no file."""
     scene: Scene
-    """As loaded: the default that changes are counted from."""
+    """The scene as loaded: the default that changes refer to."""
     material: str = ""
-    """Its material, by shipped name or path; empty where nothing named one."""
+    """Its material, by shipped name or path; empty if none was named."""
 
 
 def rig_source(rig: str, material: str) -> SceneSource:
@@ -51,16 +51,16 @@ def prepared_source(name: str) -> SceneSource:
 
 
 def study_source(file: Path) -> SceneSource:
-    """The source of a study: its shipped name where that says the same, otherwise its path."""
+    """The source of a study: its shipped name if that means the same, otherwise its path."""
     scene = study_scene(file)
     material = str(read_toml(file).get("material", ""))
-    # As the study file sees it: beside itself, before what is shipped.
+    # As the study file resolves it: a file beside it takes precedence over a shipped one.
     material = _named(str(file.parent / material)) if (file.parent / material).is_file() else material
     for name in (file.stem, str(file.absolute())):
         try:
             if load_scene(name) == scene:
                 return SceneSource((name,), scene, material)
-        except ValueError:  # the short name is taken by nothing, or by a file that is no scene
+        except ValueError:  # nothing has the short name, or a file that is not a scene
             continue
     return SceneSource((), scene, material)
 
@@ -74,7 +74,7 @@ def _named(material: str) -> str:
 def command_line(source: SceneSource, scene: Scene, seed: int) -> str:
     """``explorer simulate …`` that pours ``scene`` with ``seed``, quoted for a shell.
 
-    Raises CommandError where no settings lead from the source to ``scene``, such as other bodies or materials.
+    Raises CommandError if no settings lead from the source to ``scene``, for example if bodies or materials differ.
     """
     words = [*PROGRAM, *source.arguments]
     for setting in settings(source, scene):
@@ -83,7 +83,7 @@ def command_line(source: SceneSource, scene: Scene, seed: int) -> str:
 
 
 def settings(source: SceneSource, scene: Scene) -> tuple[str, ...]:
-    """Texts ``path=value`` that make the source's scene into exactly ``scene``; CommandError where there are none."""
+    """Texts ``path=value`` that turn the source's scene into exactly ``scene``; CommandError if there are none."""
     if not source.arguments:
         raise CommandError(
             "this scene does not come from a file that a command line can name; save the scene file instead"
@@ -101,7 +101,7 @@ def settings(source: SceneSource, scene: Scene) -> tuple[str, ...]:
 
 
 def setting_text(change: Difference) -> str:
-    """``path=value``, in the unit of the screen where that gives back every bit, otherwise in SI with all digits."""
+    """``path=value``, in the unit on the screen if that reproduces every bit, otherwise in SI with all digits."""
     if isinstance(change.now, str):
         return f"{change.path}={change.now}"
     number, unit = float(change.now), entry_unit(change.unit)
@@ -111,14 +111,14 @@ def setting_text(change: Difference) -> str:
 
 
 def _selections(found: Sequence[Difference]) -> list[list[Difference]]:
-    """All of them; or all but shares of the mass, of which setting one scales the others, with each one of these."""
+    """All differences; or, as setting one mass share scales the others, all except shares plus a single share each."""
     shares = [one for one in found if one.path.endswith(".mass_fraction")]
     rest = [one for one in found if one not in shares]
     return [list(found), *([*rest, share] for share in shares)]
 
 
 def _applied(base: Scene, texts: Sequence[str]) -> Scene | None:
-    """``base`` with settings; None where they are not allowed."""
+    """``base`` with settings; None if they are not allowed."""
     try:
         return with_settings(base, dict(text.split("=", 1) for text in texts))
     except ParameterError:
@@ -141,7 +141,7 @@ class Difference:
 
     @property
     def change(self) -> str:
-        """``before → now`` with the units of the screen, in full where they are alike to its digits."""
+        """``before → now`` in the units on the screen; with all digits if the rounded values look alike."""
         before, now = shown(self.before, self.unit), shown(self.now, self.unit)
         if before == now:
             before, now = str(self.before), f"{self.now} {'' if self.unit == '1' else self.unit}".strip()
@@ -158,7 +158,7 @@ def differences(before: Scene, now: Scene) -> Iterator[Difference]:
 
 
 def same_bodies(one: Scene, other: Scene) -> bool:
-    """Whether both scenes pour bodies of the same names, so that their parameters can be held against each other."""
+    """Whether both scenes pour bodies of the same names, so that their parameters can be compared."""
     return [body.name for body in one.bodies] == [body.name for body in other.bodies]
 
 
@@ -180,11 +180,11 @@ def change_lines(found: Iterable[Difference]) -> list[str]:
 
 
 def span(found: Sequence[Difference], values: Sequence[float | str]) -> str:
-    """``values`` of one parameter of many things: one of them, or the smallest and the largest, with their unit."""
+    """``values`` of one parameter of many objects: the value, or the smallest and the largest, with their unit."""
     numbers: list[float | str] = [*sorted(one for one in values if not isinstance(one, str))] or list(values)
     return " … ".join(dict.fromkeys(shown(one, found[0].unit) for one in (numbers[0], numbers[-1])))
 
 
 def shown(number: float | str, unit: str) -> str:
-    """A value with the unit of the screen, or the name of a choice."""
+    """A value with its unit on the screen, or the name of a choice."""
     return number if isinstance(number, str) else quantity(number, unit)

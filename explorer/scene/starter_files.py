@@ -1,4 +1,4 @@
-"""Files that a material or a study of one's own starts from. They run as they are.
+"""Files from which users start a material or a study of their own. They run as they are.
 
 The texts are templates beside this file; a study's factors are read off the material that it calibrates.
 """
@@ -23,7 +23,7 @@ SPAN = 0.2
 """Half the width of a factor's range, as a fraction of its reference."""
 MOST_FACTORS = 8
 CUT = "\n#---\n"
-"""Between the parts of a study that depend on its rig."""
+"""Separates the parts of a study template that depend on its rig."""
 
 
 def write_material(folder: Path, name: str) -> Path:
@@ -41,10 +41,10 @@ def new_path(folder: Path, name: str) -> Path:
 
 
 def write_study(folder: Path, name: str, material: str | None) -> list[Path]:
-    """Write ``NAME_study.toml`` into ``folder``, and before it the material where that is missing.
+    """Write ``NAME_study.toml`` into ``folder``, and first the material if that is missing.
 
-    ``name`` may be that of the study's file: a trailing ``_study`` is dropped. ``material`` is the path or shipped
-    name of what to calibrate; None means ``NAME.toml`` in ``folder``.
+    ``name`` may be the name of the study's file: a trailing ``_study`` is dropped. ``material`` is the path or shipped
+    name of the material to calibrate; None means ``NAME.toml`` in ``folder``.
     """
     name = name.removesuffix(STUDY_ENDING) or name
     study = folder / f"{check_name(name)}{STUDY_ENDING}.toml"
@@ -71,7 +71,7 @@ def starter_scene(path: Path) -> Scene:
 
 
 def study_scene(material: str) -> Scene:
-    """What a new study of ``material`` pours: its own rig where that is a lifted cylinder, otherwise the funnel."""
+    """The scene of a new study of ``material``: its own rig if that is a lifted cylinder, otherwise the funnel."""
     own = material_scene(material)
     return own if isinstance(own.rig, LiftingCylinder) else load_scene("funnel", material)
 
@@ -94,11 +94,11 @@ def study_text(path: Path, material: str, scene: Scene) -> str:
 
 
 def _rig_words(scene: Scene) -> dict[str, str]:
-    """What of a study depends on its rig: set-up, assumptions, declared change and scan, poured masses [kg]."""
+    """Texts of a study that depend on its rig: set-up, assumptions, declared change and scan, poured masses [kg]."""
     words = {"QUICK_MASS": "0.012", "MASS": "0.030"}
     template = "study_in_funnel.toml"
     if isinstance(scene.rig, LiftingCylinder):
-        # A cylinder that holds less than its heap needs leaves a flat layer: every profile pours all of it.
+        # A cylinder that holds too little for a heap leaves a flat layer: every profile pours all of it.
         words = dict.fromkeys(words, f"{scene.rig.mass:g}")
         template = "study_in_cylinder.toml"
     numbers = {"RIG": scene.rig.name} | {
@@ -112,7 +112,7 @@ def _rig_words(scene: Scene) -> dict[str, str]:
 
 
 def factor_paths(scene: Scene) -> list[str]:
-    """At most eight parameters that a pile may hang on, friction first, heaviest components first."""
+    """At most eight parameters that a pile may depend on, friction first, heaviest components first."""
     by_share = sorted(scene.bodies, key=lambda body: -body.mass_fraction)
     names = list(dict.fromkeys(body.material for body in by_share))
     pairs = [pair for pair in scene.pairs if {pair.a, pair.b} <= {*names, scene.rig.wall}]
@@ -146,14 +146,14 @@ def _filled(template: str, **words: str) -> str:
 
 
 def check_name(name: str) -> str:
-    """``name``, where it may be that of a file; :class:`CommandError` otherwise."""
+    """``name`` if it is allowed as the name of a file; otherwise raises :class:`CommandError`."""
     if not NAME.fullmatch(name):
         raise CommandError(f"NAME {name!r}: letters, digits, - and _ are allowed")
     return name
 
 
 def write_new(path: Path, text: str) -> Path:
-    """Write ``path``, its folder with it; :class:`CommandError` if it exists."""
+    """Write ``path``, and create its folder; :class:`CommandError` if the file exists."""
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
         with path.open("x", encoding="utf-8") as file:

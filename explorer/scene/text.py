@@ -1,9 +1,9 @@
-"""A scene as the text of a material file, and a body as that of a body file: both are read back as they were.
+"""A scene as the text of a material file, and a body as the text of a body file: both read back unchanged.
 
 A material file (`solver.scenes.material_file`) has everything in SI: materials, bodies, pairs, rig, insertion,
-numerics, what of the contact law is not as usual, and the effects that are on. Numbers keep all their digits; meshes
-are named by their full path. A body file, which `explorer shape` writes and a material file takes in, declares one body
-by its spheres.
+numerics, contact-law settings that are not the default, and the effects that are on. Numbers keep all their digits;
+meshes are named by their full path. A body file, which `explorer shape` writes and a material file can include,
+declares one body by its spheres.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def _set_up(scene: Scene, kind: str) -> dict[str, Any]:
 
 
 def _contact(scene: Scene) -> dict[str, Any]:
-    """What differs from the conventions of a file that names none."""
+    """The contact settings that differ from those of a file that states none."""
     usual = ContactModel()
     return {key: entry for key, entry in _set_up(scene, "contact").items() if entry != getattr(usual, key)}
 
@@ -128,12 +128,12 @@ def body_text(
     """Text of a body file.
 
     Args:
-        name: of the body.
+        name: name of the body.
         file: name of the body file.
-        solid: the mesh that the spheres stand for.
+        solid: the mesh that the spheres represent.
         centres: (n, 3) in its principal frame [m].
         radii: (n,) [m].
-        density: [kg/m3] of the mass that is written.
+        density: density [kg/m3] for the mass that is written.
         drawn: path of the mesh as seen from the body file; None to draw the spheres instead.
     """
     true, fit = mass_properties(solid, density), measured_fit(solid, centres, radii)
@@ -177,18 +177,18 @@ def _numbers(values: Iterable[float]) -> str:
 
 
 def toml_key(name: str) -> str:
-    """``name`` as a key, quoted where it has to be."""
+    """``name`` as a key, quoted if necessary."""
     return name if name.replace("_", "").replace("-", "").isalnum() and name.isascii() else toml_value(name)
 
 
 def toml_value(entry: Any) -> str:
-    """A value of a plain type; every float in the digits that give it back."""
+    """A value of a plain type; every float with the digits that reproduce it exactly."""
     if isinstance(entry, Mapping):
         return "{ " + ", ".join(f"{toml_key(key)} = {toml_value(item)}" for key, item in entry.items()) + " }"
     if isinstance(entry, list | tuple):
         return "[" + ", ".join(toml_value(item) for item in entry) + "]"
     if isinstance(entry, str):
-        # JSON writes a letter beyond U+FFFF as two halves, which TOML refuses, and leaves U+007F as it is.
+        # JSON escapes a character beyond U+FFFF as two halves, which TOML refuses, and leaves U+007F as it is.
         return json.dumps(entry, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(entry, bool):
         return "true" if entry else "false"

@@ -1,4 +1,4 @@
-"""The panels of the page in their order: those of this program, then those of installed packages."""
+"""The panels of the page in order: this program's first, then those of installed packages."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""How the page begins: lamps, camera, dark or light, and small text in a panel; the same live and in a replay.
+"""How the page starts: lamps, camera, dark or light, and small text in a panel; the same live and in a replay.
 
-Dark or light is set for viser's own parts, and for the charts, which follow no theme by themselves.
+Dark or light is set for viser's own parts, and separately for the charts, which do not follow the theme by themselves.
 """
 
 from __future__ import annotations
@@ -18,43 +18,43 @@ from explorer.viewer.actions import Post
 from explorer.viewer.palette import BRAND, BRAND_ON_WHITE
 
 DARK = True
-"""How the page begins."""
+"""Whether the page starts dark."""
 VIEW_DIRECTION = (0.62, -0.75, 0.24)
-"""From the pile to the camera."""
+"""Direction from the pile to the camera."""
 VIEW_FIELD = 0.6
 """Vertical field of view [rad]."""
 FILL = 0.68
-"""Share of the height of the window that rig and feed take."""
+"""Share of the window's height that rig and feed take up."""
 MIDDLE = 0.42
 """Height that the camera looks at, as a share of the height of rig and feed."""
 SKY = 0.7
-"""Light from everywhere, so that what lies in the shade is not black."""
+"""Intensity of the ambient light, which keeps shaded parts from being black."""
 
 
 @dataclass(frozen=True)
 class CameraView:
-    """A place of the camera [m] and what it looks at [m]."""
+    """The position of the camera [m] and the point that it looks at [m]."""
 
     position: npt.NDArray[np.float64]
     look_at: npt.NDArray[np.float64]
 
 
 def view_from(direction: tuple[float, float, float], height: float) -> CameraView:
-    """From ``direction`` (pile to camera), with everything up to ``height`` [m] in one picture."""
+    """View from ``direction`` (pile to camera), with everything up to ``height`` [m] in the picture."""
     distance = height / FILL / (2.0 * math.tan(VIEW_FIELD / 2.0))
     middle = np.array([0.0, 0.0, MIDDLE * height])
     return CameraView(middle + distance * np.array(direction), middle)
 
 
 def light(server: viser.ViserServer, shadows: bool = True) -> None:
-    """viser's lamps with shadows; no sky, which takes a browser without a graphics card a third of its time."""
+    """Set viser's lamps with shadows, and no sky: it takes a third of the time of a browser without a graphics card."""
     server.scene.configure_default_lights(enabled=True, cast_shadow=shadows)
     server.scene.configure_environment_map(None)
     server.scene.add_light_ambient("/sky", intensity=SKY)
 
 
 def look_at_height(server: viser.ViserServer, height: float) -> None:
-    """Camera that new clients start with: everything up to ``height`` [m] in one picture."""
+    """Set the camera that new clients start with: everything up to ``height`` [m] is in the picture."""
     view, camera = view_from(VIEW_DIRECTION, height), server.initial_camera
     camera.position, camera.look_at = view.position, view.look_at
     camera.fov = VIEW_FIELD
@@ -70,7 +70,7 @@ def apply_theme(server: viser.ViserServer, dark: bool) -> None:
 
 
 class ThemeSwitch:
-    """A switch for all browsers, with the page's type; ``follow`` is called with True for dark."""
+    """A dark-page switch for all browsers; ``follow`` is called with True for dark."""
 
     def __init__(self, server: viser.ViserServer, post: Post, follow: Callable[[bool], None]) -> None:
         self._server, self._follow = server, follow
@@ -88,5 +88,5 @@ class ThemeSwitch:
 
 
 def small_html(contents: str) -> str:
-    """``contents`` (HTML) in the size and margin of such a text; long words are broken."""
+    """``contents`` (HTML) with the font size and margins of small panel text; long words are broken."""
     return f"<div style='padding:0 0.75em; font-size:13px; overflow-wrap:anywhere'>{contents}</div>"

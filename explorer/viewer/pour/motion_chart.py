@@ -27,7 +27,7 @@ class MotionHistory:
         self._energy, self._contacts = ThinnedCurve(), ThinnedCurve()
 
     def add(self, status: Status) -> bool:
-        """Take note of ``status``; True if there is something new to draw."""
+        """Record ``status``; True if there is something new to draw."""
         fresh = status.generation != self._generation
         if fresh:
             self._generation, self._last = status.generation, -math.inf

@@ -1,4 +1,4 @@
-"""The pile from the side with its flank fit, in the panel and in 3-D, and measured data laid over it."""
+"""The pile from the side with its flank fit, in the panel and in 3-D, overlaid with measured data."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NONE, OWN = "none", "folder below"
 
 
 class OutlinePanel(Panel):
-    """Drawing, and the choice of what is laid over it: data sets that are shipped, and others."""
+    """The drawing, and the choice of its overlay: shipped data sets, and others."""
 
     name, tab, title, folded = "outline", POUR, "Silhouette and flank fit", False
 
@@ -79,7 +79,7 @@ class OutlinePanel(Panel):
         on_upload(self._upload, self._take, post)
 
     def show(self, now: Now) -> None:
-        """Draw what is new; a choice that was refused is set back to what is drawn."""
+        """Draw what is new; a refused choice goes back to what is drawn."""
         if self._data.value != self._chosen and self._background.busy_with != self._reading:
             self._data.value = self._chosen  # type: ignore[misc]
         drawn = (now.status.outline, self._measured, bool(self._in_scene.value))
@@ -92,7 +92,7 @@ class OutlinePanel(Panel):
             self._html.content = html
 
     def _take(self, name: str, content: bytes) -> None:
-        """Lay what was sent over the pile: a data set, which is kept, or a single curve."""
+        """Overlay the pile with what was sent: a data set, which is kept, or a single curve."""
         if Path(name).suffix.lower() in SUFFIXES:
             scale = float(self._pixel.value)
             pixel = 1e-3 * scale if math.isfinite(scale) and scale > 0.0 else None

@@ -1,7 +1,7 @@
-"""The matrix of one parameter of all pairs of materials: what the solver has in force, and a box for every pair.
+"""The matrix of one parameter of all pairs of materials: the solver's present values, and a box for every pair.
 
-viser has no table of inputs: a row of the lower triangle is a vector of up to three boxes, and longer rows take
-several.
+viser has no table of inputs: a row of the lower triangle is a vector of up to three boxes, and a longer row takes
+several vectors.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ BOXES = 3
 
 
 class PairMatrix:
-    """The matrix of the parameter ``name`` in a folder of its own."""
+    """The matrix of the parameter ``name``, in a folder of its own on the page."""
 
     def __init__(self, gui: viser.GuiApi, scene: Scene, name: str, post: Post, apply: Apply) -> None:
         self._name, self._apply = name, apply
@@ -39,7 +39,7 @@ class PairMatrix:
             row.box.listen(post, partial(self._take, row))
 
     def follow(self, scene: Scene) -> None:
-        """Show the solver's values, but not in a row that a person is at."""
+        """Show the solver's values, except in a row that a person is editing."""
         html = matrix_html(scene, self._parameter, self._name)
         if self._table.content != html:
             self._table.content = html
@@ -65,7 +65,7 @@ class PairMatrix:
         return tuple(screen_unit(self._parameter).to_screen(float(value(scene, path))) for path in paths)
 
     def _take(self, row: PairRow, sent: object) -> None:
-        """Set those pairs of a row whose box shows another number than before."""
+        """Set those pairs of a row whose number has changed."""
         low, high = screen_range(self._parameter)
         numbers = tuple(checked(number, low, high, title(self._parameter)) for number in entries(sent))
         if len(numbers) != len(row.paths):
@@ -85,16 +85,16 @@ class PairRow:
     box: SharedBox
     paths: tuple[str, ...]
     shown: tuple[float, ...]
-    """What the boxes showed last, in the unit of the screen."""
+    """What the boxes showed last, in the unit on the screen."""
 
 
 def pair_parameters() -> tuple[str, ...]:
-    """Names of what pairs have, each with a matrix of its own."""
+    """Names of the live parameters of pairs, each with a matrix of its own."""
     return tuple(path.partition(".")[2] for path, parameter in declared(Pair, "pair").items() if parameter.live)
 
 
 def entries(sent: object) -> tuple[Any, ...]:
-    """What boxes hold, one or several."""
+    """The values of one box or of several boxes, as a tuple."""
     return tuple(sent) if isinstance(sent, (tuple, list)) else (sent,)
 
 
@@ -104,7 +104,7 @@ def names_in_pairs(scene: Scene) -> tuple[str, ...]:
 
 
 def triangle(scene: Scene) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Rows of the lower triangle: a name, and up to ``BOXES`` names that it has a pair with; none is left out."""
+    """Rows of the lower triangle: a name, and up to ``BOXES`` names that it has a pair with; no pair is left out."""
     names = names_in_pairs(scene)
     for k, one in enumerate(names):
         others = [other for other in names[: k + 1] if _pair(scene, one, other) is not None]
@@ -113,7 +113,7 @@ def triangle(scene: Scene) -> Iterator[tuple[str, tuple[str, ...]]]:
 
 
 def matrix_html(scene: Scene, parameter: Parameter, name: str) -> str:
-    """The whole matrix as the solver has it; a dash where there is no such pair."""
+    """The whole matrix with the solver's values; a dash where there is no such pair."""
     names = names_in_pairs(scene)
     style = "style='padding:0 0.5em; text-align:right; font-variant-numeric:tabular-nums'"
     head = "".join(f"<th {style}>{escape(other)}</th>" for other in names)

@@ -19,7 +19,7 @@ STYLE = """<style>
 
 
 class ReadingsPanel(Panel):
-    """A table of what the solver tells of itself."""
+    """A table of what the solver reports about itself."""
 
     name, tab = "readings", POUR
 
@@ -27,14 +27,14 @@ class ReadingsPanel(Panel):
         self._html = page.server.gui.add_html("")
 
     def show(self, now: Now) -> None:
-        """Tell what the solver is doing."""
+        """Show what the solver is doing."""
         html = readings_html(now.status)
         if self._html.content != html:
             self._html.content = html
 
 
 def readings_html(status: Status) -> str:
-    """All readings."""
+    """HTML of all readings."""
     cells = "".join(_cell(name, text) for name, text in readings(status))
     cells += "".join(_cell(name, text, "wide") for name, text in long_readings(status))
     return f"{STYLE}<div class='readings'><div class='grid'>{cells}</div></div>"
@@ -52,7 +52,7 @@ def readings(status: Status) -> list[tuple[str, str]]:
 
 
 def long_readings(status: Status) -> list[tuple[str, str]]:
-    """Names and texts of the readings that take a line each."""
+    """Names and texts of the readings that take a whole line each."""
     starting, running = status.state == SessionState.STARTING, status.state == SessionState.RUNNING
     real_time = f"{pace(status)} of {status.speed:.3g} wanted" if running else "–"
     mass = f"{1e3 * status.discharged_mass:.1f} of {1e3 * status.poured_mass:.1f} g"
@@ -68,7 +68,7 @@ def long_readings(status: Status) -> list[tuple[str, str]]:
 
 
 def time_step_text(status: Status) -> str:
-    """Time step, and what part it is of the largest stable one."""
+    """Time step, and its share of the largest stable time step."""
     text = f"{1e6 * status.dt:.2f} µs"
     if math.isfinite(status.dt_limit):
         text += f", {status.dt / status.dt_limit:.0%} of the stability limit"

@@ -1,4 +1,4 @@
-"""Panels that are made from a scene's parameters, and made anew for a scene that has others."""
+"""Panels that are built from a scene's parameters, and rebuilt for a scene with different ones."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ Controls = TypeVar("Controls", bound=SceneControls)
 
 
 class RebuiltPanel(Panel, Generic[Controls]):
-    """Holds the place of controls on the page; :meth:`build` makes them for a scene."""
+    """Reserves the place of controls on the page; :meth:`build` makes the controls for a scene."""
 
     def __init__(self, page: PageContext) -> None:
         self._page, scene = page, page.session.status().scene
-        # Without a title a folder is no more than a place that keeps its order among its neighbours.
+        # A folder without a title is only a placeholder that keeps its position among its neighbours.
         self._place = page.server.gui.add_folder(None)
         self._layout: object = None
         self._contents: viser.GuiFolderHandle | None = None
@@ -37,7 +37,7 @@ class RebuiltPanel(Panel, Generic[Controls]):
         raise NotImplementedError
 
     def controls(self, scene: Scene) -> Controls:
-        """Those for ``scene``: the present ones where they fit, otherwise new ones in their place."""
+        """Controls for ``scene``: the present ones if they fit, otherwise new ones in their place."""
         wanted = layout(scene)
         if wanted == self._layout:
             return self._controls
@@ -51,11 +51,11 @@ class RebuiltPanel(Panel, Generic[Controls]):
         return self._controls
 
     def show(self, now: Now) -> None:
-        """Follow the solver, with other controls where the scene asks for them."""
+        """Follow the solver, with new controls if the scene requires them."""
         self.controls(now.status.scene).show(now.status)
 
 
 def layout(scene: Scene) -> tuple[object, ...]:
-    """What panels are made from: declarations of the parameters, rig, and which bodies are of which material."""
+    """What the controls depend on: declarations of the parameters, the rig, and which body is of which material."""
     bodies = tuple((body.name, body.material) for body in scene.bodies)
     return scene.rig.name, bodies, tuple(parameters(scene).items())

@@ -1,4 +1,4 @@
-"""Another rig, material, shape or funnel: each pours anew, and becomes the default that changes are counted from."""
+"""Another rig, material, shape or funnel: each starts a new pour, and becomes the default that changes refer to."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from solver.scenes.scene import Scene, check
 from solver.shapes.mesh_file import LENGTH_UNITS, SUFFIXES
 
 OWN = "file below"
-"""Choice of the list that takes the file in the text field."""
+"""Entry of the list that stands for the file in the text field."""
 NO_SCENE = "choose …"
 UNIT_OF_FILE = "as usual"
-"""Choice of the unit of a mesh: that of its format, or millimetres."""
+"""Unit choice for a mesh that means the unit of its format, or else millimetres."""
 
 WORKING = "Reading what was asked for; the pour goes on until that is done."
 
 
 class ScenePanel(Panel):
-    """Choices of rig and material with a button, uploads of a material, of a body's shape and of a funnel."""
+    """Choices of rig and material with a button, and uploads of a material, a body's shape or a funnel."""
 
     name, tab, title = "scene", SET_UP, "Rig and material"
 
@@ -85,7 +85,7 @@ class ScenePanel(Panel):
         on_upload(self._funnel, self._take_funnel, post)
 
     def show(self, now: Now) -> None:
-        """Follow a pour that somebody else started."""
+        """Follow a pour that was started elsewhere."""
         status = now.status
         if status.generation != self._generation:
             self._generation = status.generation
@@ -99,7 +99,7 @@ class ScenePanel(Panel):
             self._doing.content = doing
 
     def _show_material(self, material: str) -> None:
-        """Choose the material that is being poured, where its source names one."""
+        """Select the material that is being poured, if its source names one."""
         if material in self._shipped:
             self._material.value = material  # type: ignore[misc]
         elif material:
@@ -133,7 +133,7 @@ class ScenePanel(Panel):
         self._begin("reading the funnel", lambda: funnel_source(present, name, content, unit, self._folder))
 
     def _given_unit(self) -> str | None:
-        """Unit of a mesh's coordinates; None: that of its format."""
+        """Unit of a mesh's coordinates; None for that of its format."""
         unit = str(self._unit.value)
         if unit not in (UNIT_OF_FILE, *LENGTH_UNITS):
             raise CommandError(f"unit {unit[:60]!r}; allowed: {', '.join(LENGTH_UNITS)}")
@@ -151,6 +151,6 @@ def _names(scene: Scene) -> tuple[str, ...]:
 
 
 def _checked(source: SceneSource) -> SceneSource:
-    """``source``, unless its bodies do not fit into the rig: ParameterError."""
+    """``source``. Raises ParameterError if its bodies do not fit into the rig."""
     check(source.scene)
     return source

@@ -1,4 +1,4 @@
-"""Controls of the second pile: it stays as it was poured while the first is changed; both are told side by side."""
+"""Controls of the second pile: it stays as poured while the first is changed; both results are shown side by side."""
 
 from __future__ import annotations
 
@@ -40,15 +40,15 @@ class SecondPile(Panel):
         self._text = gui.add_markdown(NONE)
 
     def close(self) -> None:
-        """End the second pour and take it off the page."""
+        """End the second pour and remove it from the page."""
         self._beside.close()
 
     def draw(self, now: Now) -> None:
-        """Draw its newest frame."""
+        """Draw the newest frame of the second pile."""
         self._beside.draw()
 
     def show(self, now: Now) -> None:
-        """Tell both results, and let time go or stand as in the first."""
+        """Show both results; the second pour runs or pauses with the first."""
         second = self._beside.follow(now.status)
         text = NONE
         if second is not None:
@@ -59,7 +59,7 @@ class SecondPile(Panel):
 
 
 def come_to(status: Status) -> str:
-    """In a few words how far a pour is: its angle once it has ended."""
+    """How far a pour is, in a few words: its angle once it has ended."""
     if status.outcome == Outcome.RUNNING:
         return STATE_WORDS[status.state] if status.state in TROUBLE else f"pouring, {status.time:.1f} s"
     angle = angle_of_repose_deg(status)
@@ -69,7 +69,7 @@ def come_to(status: Status) -> str:
 
 
 def comparison_markdown(first: Status, second: Status) -> str:
-    """Both piles side by side: what they do, their angles with the spread over flanks, and what differs."""
+    """Both piles side by side: their states, their angles with the spread over flanks, and their differences."""
     rows = [
         ("", "first", "second"),
         (":--", "--:", "--:"),

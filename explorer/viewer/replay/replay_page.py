@@ -1,8 +1,8 @@
-"""``explorer serve --replay``: a recording on the page, with a time slider, keys, curves, the log and the look.
+"""``explorer serve --replay``: a recording on the page, with a time slider, keys, curves, the event log and the look.
 
-A replay plays at a speed, stops at the end, and steps from frame to frame. It is drawn by the live page's nodes for
-the scene that the file holds; an older file holds none, and its bodies and surfaces are drawn in the meshes and colours
-that it has. Colours, cut, rig and cameras have the live page's controls.
+A replay plays at an adjustable speed, stops at the end, and can step from frame to frame. The live page's nodes draw it
+for the scene that the file holds; an older file holds no scene, so its bodies and surfaces are drawn in the meshes and
+colours of the file. Colours, cut, rig and cameras have the same controls as on the live page.
 """
 
 from __future__ import annotations
@@ -49,16 +49,16 @@ from solver.scenes.scene import Scene
 Array = npt.NDArray[np.float64]
 
 FRAME_INTERVAL = 1.0 / 30.0
-"""Wall time [s] between two looks at the replay."""
+"""Wall time [s] between two updates of the replay."""
 EVENTS_SHOWN = 6
 NO_SCENE = "This recording is older and does not hold its scene: the rig is drawn as the file has it, without rims."
 PLAY_PAUSE, TO_START, BACK, STEP = "Play / pause (space)", "To start (R)", "◀ frame (←)", "frame ▶ (→)"
 HAIR = 1e-6
-"""Time [s] by which the end of a chart moves to and fro."""
+"""Time [s] by which the end of a chart alternates."""
 SLIDER_STEP = 1e-3
-"""Step of the time slider [s]; finer than frames lie."""
+"""Step of the time slider [s]; finer than the spacing of frames."""
 LEAST_AXIS = 0.1
-"""Times of a chart go to here [s] at least: between closer numbers there is no room."""
+"""A chart's time axis extends to at least this time [s]: the labels of a shorter axis would not fit."""
 CURVES = (
     ("angle_of_repose_deg", "angle [°]", ANGLE_LINE),
     ("discharged_mass_g", "mass [g]", MASS_LINE),
@@ -101,7 +101,7 @@ class ReplayPage:
             self._look = ReplayLook(server, recording, colour_bar, self._actions.post)
         self._seen = False
         server.on_client_connect(lambda _: self._actions.post(self._begin))
-        # viser's charts are drawn for both.
+        # viser's charts look right on dark and on light.
         ThemeSwitch(server, self._actions.post, lambda dark: None)
 
     def _controls(self) -> None:
@@ -115,7 +115,7 @@ class ReplayPage:
         post = self._actions.post
         button_group(gui, "Time", acts, post, hint="Arrows on a slider move the slider only.")
         add_keys(gui, acts, {PLAY_PAUSE: "space", TO_START: "R", BACK: "arrowleft", STEP: "arrowright"}, post)
-        # A whole number of steps: viser writes the ends, and what is in the box, with as many digits as they have.
+        # A whole number of steps: viser shows the ends, and the value in the box, with all the digits that they have.
         last = round(SLIDER_STEP * max(1, math.ceil((timeline.last - SAME_TIME) / SLIDER_STEP)), 3)
         self._slider = gui.add_slider("Time [s]", 0.0, last, SLIDER_STEP, 0.0)
 
@@ -146,13 +146,13 @@ class ReplayPage:
             frames.wait(stop)
 
     def _begin(self) -> None:
-        """Play from the beginning for the first browser: until then nobody has seen anything."""
+        """Play from the beginning when the first browser connects: until then nobody has seen anything."""
         if not self._seen:
             self._seen, self._timeline.time = True, self._timeline.first
             self._timeline.playing = True
 
     def show(self) -> None:
-        """Draw the present moment; what is drawn already is left alone."""
+        """Draw the present moment, unless it is drawn already."""
         time = self._timeline.time
         with self._server.atomic():
             self._look.show(time)
@@ -186,11 +186,11 @@ def _plot(server: viser.ViserServer, recording: Recording, name: str, label: str
 
 
 def columns(times: Array, values: Array, now: float, last: float, turn: int = 0) -> tuple[Array, Array, Array]:
-    """Times, values, and the value at ``now`` [s] alone, NaN elsewhere; the first and the last row are no points.
+    """Times, values, and the value at ``now`` [s] with NaN elsewhere; the first and the last row are not data points.
 
-    They stretch all charts over the same times, from 0 to ``last`` [s].
-    A chart lays its axes out anew only when the range of its times changes. The first data may come before the chart
-    knows its size, and would leave it without numbers; so the end moves by a hair at every ``turn``.
+    Those two rows stretch all charts over the same times, from 0 to ``last`` [s].
+    A chart lays out its axes again only when the range of its times changes. The first data may arrive before the chart
+    knows its size, which would leave its axes without numbers; so the end moves slightly at every ``turn``.
     """
     marked = np.full(len(times) + 2, np.nan)
     k = int(np.searchsorted(times, now, side="right")) - 1
@@ -201,7 +201,7 @@ def columns(times: Array, values: Array, now: float, last: float, turn: int = 0)
 
 
 def moment_html(recording: Recording, time: float, playing: bool, notice: str = "") -> str:
-    """The moment in words and numbers, what was refused last, and what has happened. Texts of the file are escaped."""
+    """State, time and bodies, the last refusal, and the events so far. Texts from the file are escaped."""
     bodies = sum(len(component.at(time).scale) for component in recording.components)
     lines = [f"{'playing' if playing else 'paused'} · {time:.3f} of {recording.times[-1]:.3f} s · {bodies} bodies"]
     happened = [f"{when:.3f} s  {text}" for when, text in recording.events if when <= time + 1e-9]
@@ -210,7 +210,7 @@ def moment_html(recording: Recording, time: float, playing: bool, notice: str = 
 
 
 class Timeline:
-    """A moment within ``times`` [s], ascending, at least one."""
+    """A moment within ``times`` [s], which are ascending and at least one."""
 
     def __init__(self, times: npt.NDArray[np.float64]) -> None:
         self.times = times
@@ -229,13 +229,13 @@ class Timeline:
         return float(self.times[-1])
 
     def pass_by(self, wall: float) -> None:
-        """Go on by ``wall`` seconds of the clock while playing; at the end, stop."""
+        """While playing, advance by ``wall`` seconds of wall time; stop at the end."""
         if self.playing:
             self.go_to(self.time + self.speed * wall)
             self.playing = self.time < self.last
 
     def go_to(self, time: float) -> None:
-        """Stand at ``time`` [s], or at the end that it is beyond."""
+        """Move to ``time`` [s], or to the nearer end if it lies outside."""
         self.time = min(max(time, self.first), self.last)
 
     def toggle(self) -> None:
@@ -245,7 +245,7 @@ class Timeline:
         self.playing = not self.playing
 
     def step(self, frames: int) -> None:
-        """Pause, and go on by so many frames (back if negative)."""
+        """Pause, and move by so many frames (back if negative)."""
         self.playing = False
         here = int(np.searchsorted(self.times, self.time + 1e-9, side="right")) - 1
         between = self.times[here] < self.time - 1e-9
@@ -254,7 +254,7 @@ class Timeline:
 
 
 class ReplayLook:
-    """Draws the frames of ``recording`` as a person wants to see them; ``bar`` explains the colours."""
+    """Draws the frames of ``recording`` as the Look settings ask; ``bar`` explains the colours."""
 
     def __init__(self, server: viser.ViserServer, recording: Recording, bar: viser.GuiHtmlHandle, post: Post) -> None:
         self._frames, self._nodes = RecordedFrames(recording), replay_nodes(server, recording)
@@ -269,7 +269,7 @@ class ReplayLook:
         self._told_for: object = None
 
     def show(self, time: float) -> None:
-        """Draw the moment ``time`` [s]; call it inside ``server.atomic()``, as often as the page is looked at."""
+        """Draw the moment ``time`` [s]; call it inside ``server.atomic()`` at every update of the page."""
         number = self._frames.number_at(time)
         if number != self._frame.number:
             self._frame = self._frames.frame(number)
@@ -287,14 +287,14 @@ class ReplayLook:
 
 
 def replay_nodes(server: viser.ViserServer, recording: Recording) -> DrawnNodes:
-    """The live page's nodes if ``recording`` holds its scene, else those of the meshes in the file."""
+    """The live page's nodes if ``recording`` holds its scene, else nodes for the meshes in the file."""
     if recording.scene is None:
         return MeshNodes(server, recording)
     return RecordedSceneNodes(server, recording.scene, recording.surfaces)
 
 
 class RecordedSceneNodes(SceneNodes):
-    """Nodes of ``scene``; its gate is there as long as it was among the recorded ``surfaces``."""
+    """Nodes of ``scene``; the gate is visible as long as it was among the recorded ``surfaces``."""
 
     def __init__(self, server: viser.ViserServer, scene: Scene, surfaces: Sequence[RecordedSurface]) -> None:
         super().__init__(server, scene)
@@ -340,14 +340,14 @@ class MeshNodes:
                 node.position, node.wxyz = pose[:3], pose[3:]
 
     def fade(self, opacity: float) -> None:
-        """Opacity of the surfaces that one has to look through."""
+        """Set the opacity of the surfaces that a viewer has to look through."""
         for surface, node in self._surfaces:
             if seen_through(surface.shape.name):
                 node.opacity = opacity
 
 
 def drawn_height(recording: Recording) -> float:
-    """What a picture of it all reaches up to [m]; without a scene the top of the rig, or of the bodies."""
+    """Height [m] that a picture of everything has to show; without a scene, the top of the rig or of the bodies."""
     if recording.scene is not None:
         return scene_height(recording.scene)
     tops = [float(s.shape.vertices[:, 2].max()) for s in recording.surfaces]
@@ -356,5 +356,5 @@ def drawn_height(recording: Recording) -> float:
 
 
 def inert(document: str) -> str:
-    """Markdown of a recording, which may be a stranger's: tables stay, HTML is shown as text, no picture is fetched."""
+    """Make the Markdown of a recording, which may be a stranger's, safe: HTML becomes text, no picture is fetched."""
     return document.replace("<", "&lt;").replace("![", "!\\[")

@@ -1,4 +1,4 @@
-"""A command that runs in the background: the buttons that mean something now, a bar, where it is, and failed runs."""
+"""A command that runs in the background: the buttons that apply now, a progress bar, its state, and failed runs."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ MARKDOWN_MARKS = re.compile(r"([\\`*_{}\[\]<>()#+!|~&])")
 START, PAUSE, CONTINUE, CANCEL = "Start", "Pause", "Continue", "Cancel"
 RESUME, RETRY, QUEUE, CLEAR = "Resume last", "Retry", "Queue", "Clear queue"
 GOES_ON = f"Cancelled. What was poured is kept: *{RESUME}* goes on."
-"""Of a cancelled command that is the one to be resumed."""
+"""Text for a cancelled command that *Resume* would continue."""
 OFFERED = {"running": (PAUSE, CANCEL, QUEUE), "paused": (CONTINUE, CANCEL, QUEUE)}
-"""State → buttons while a command is there; otherwise one can be started, resumed or tried again."""
+"""State → buttons while there is a command; otherwise one can be started, resumed or retried."""
 
 STATE_WORDS = {
     "running": "Running at low priority; the pour goes on.",
@@ -35,7 +35,7 @@ DONE, AT_WORK, TO_COME = "done", "▶", "–"
 
 
 def orders(process: BackgroundOrders, start: Action, resume: Action, queue: Action) -> dict[str, Action]:
-    """What the buttons of ``process`` do; ``start``, ``resume`` and ``queue`` read what was chosen in the panel."""
+    """What the buttons of ``process`` do; ``start``, ``resume`` and ``queue`` read the choices in the panel."""
     return {
         START: start,
         PAUSE: process.pause,
@@ -48,7 +48,7 @@ def orders(process: BackgroundOrders, start: Action, resume: Action, queue: Acti
 
 
 class ProcessView:
-    """Buttons named ``title`` that post the ``acts`` of their names, a bar and a text."""
+    """A group of buttons with a ``title``, each posting the action of its name in ``acts``, a bar and a text."""
 
     def __init__(self, server: viser.ViserServer, title: str, acts: Mapping[str, Action], post: Post) -> None:
         self._acts = dict(acts)
@@ -57,7 +57,7 @@ class ProcessView:
         self._text = server.gui.add_markdown("")
 
     def show(self, status: CommandStatus, text: str, waiting: Sequence[str] = (), resumable: bool = True) -> None:
-        """Buttons, bar and text; call it inside ``server.atomic()``. ``resumable``: one was stopped before its end."""
+        """Update all; call it inside ``server.atomic()``. ``resumable``: a command was stopped before its end."""
         again = (RETRY,) if status.state == "failed" or failures(status.tried) else ()
         idle = (START, *((RESUME,) if resumable else ()), *again)
         wanted = (*OFFERED.get(status.state, idle), *((CLEAR,) if waiting else ()))
@@ -76,7 +76,7 @@ class ProcessView:
 
 
 class PlaceChoice:
-    """A list of where the next command of ``what`` pours; none where there is nothing to choose."""
+    """A list of places where the next ``what`` can pour; there is no list if there is only one place."""
 
     def __init__(self, server: viser.ViserServer, place: PourPlace, what: str, post: Post) -> None:
         self._place, self._box = place, None
@@ -88,7 +88,7 @@ class PlaceChoice:
         self._box.listen(post, lambda sent: place.choose(str(sent)))
 
     def show(self) -> None:
-        """What was chosen, perhaps in another panel."""
+        """Show the choice, which may have been made in another panel."""
         if self._box is not None and not self._box.held() and self._box.value != self._place.chosen:
             self._box.show(self._place.chosen)
 
@@ -101,15 +101,15 @@ def progress(status: CommandStatus) -> float:
 def state_markdown(
     status: CommandStatus, what: str, runs: str, notice: str = "", counted: str = "", goes_on: bool = False
 ) -> str:
-    """State, messages and failed runs; texts of the command are escaped.
+    """State, messages and failed runs; texts from the command are escaped.
 
     Args:
         status: how far it is.
-        what: what a run of the command is called, such as "study"; empty to leave out that none is running.
-        runs: what is counted, such as "runs".
+        what: the name of one run of the command, such as "study"; empty: do not say that none is running.
+        runs: the name of what is counted, such as "runs".
         notice: the page's own last message, such as a refused click.
-        counted: what the numbers done and planned and the time left are of, where it is less than the whole.
-        goes_on: whether *Resume last* goes on with this very command, if it was cancelled.
+        counted: the part that the numbers done and planned and the time left cover, if they do not cover the whole.
+        goes_on: whether *Resume last* would continue this very command, if it was cancelled.
     """
     state = (
         GOES_ON
@@ -129,7 +129,7 @@ def state_markdown(
 
 
 def failures_markdown(lost: tuple[FailedRun, ...]) -> str:
-    """The newest runs that gave no pile, and what took their places."""
+    """The newest runs that gave no pile, and what replaced them."""
     rows = "\n".join(
         f"| {escaped(one.run.stage)} | {escaped(one.run.label)} | {_outcome(one)} | {one.run.seed} | {_next(one)} |"
         for one in lost[:FAILURES_SHOWN]
@@ -151,12 +151,12 @@ def _next(one: FailedRun) -> str:
 
 
 def waiting_markdown(waiting: Sequence[str]) -> str:
-    """A paragraph with the orders that wait, next one first; empty where none does."""
+    """A paragraph with the waiting orders, next one first; empty if there are none."""
     return f"\n\nWaiting: {escaped('; '.join(waiting))}." if waiting else ""
 
 
 def time_left(eta_s: float | None) -> str:
-    """Seconds as "2 min 05 s"; a dash where nobody knows."""
+    """Seconds as "2 min 05 s"; a dash if the time is unknown."""
     if eta_s is None or not 0.0 <= eta_s < 1e6:
         return "–"
     minutes, seconds = divmod(round(eta_s), 60)
@@ -164,5 +164,5 @@ def time_left(eta_s: float | None) -> str:
 
 
 def escaped(text: str) -> str:
-    """``text`` as one line that markdown shows as it is."""
+    """``text`` on one line, escaped so that Markdown shows it literally."""
     return MARKDOWN_MARKS.sub(r"\\\1", " ".join(text.split()))

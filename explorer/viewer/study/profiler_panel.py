@@ -1,4 +1,4 @@
-"""The profiler: a slider per factor of the response surface; the traces of the others follow at once."""
+"""The profiler: a slider per factor of the response surface; the traces of the other factors follow at once."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ from explorer.viewer.study.process_view import escaped
 
 TITLE = "Profiler"
 STEPS = 200
-"""Steps of a slider over the region."""
+"""Number of steps of a slider across the region."""
 EMPTY = "The profiler comes with the response surface."
 
 
 class ProfilerPanel:
-    """Sliders, the prediction in words, and a button that hands the values on.
+    """Sliders, the prediction in words, and a button that passes the values on.
 
     Args:
         server: the page.
-        post: how a callback leaves its action.
-        moved: called with the titles of the charts after a slider was moved; one of them is to be drawn anew.
-        apply: takes path → value [SI], for the live pour.
+        post: takes the action of a callback.
+        moved: called with the titles of the charts after a slider was moved; one of the charts has to be redrawn.
+        apply: called with path → value [SI], for the live pour.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class ProfilerPanel:
         pour.on_click(lambda _: post(self._hand_on))
 
     def show(self, result: AnyStudy | None) -> None:
-        """Follow the result that the page shows; it may have got no surface yet."""
+        """Follow the result that the page shows; it may not have a surface yet."""
         self._targets = () if result is None else fitted_targets(result)
         region = [(self._paths(), one.low.tolist(), one.high.tolist()) for one in self._targets[:1]]
         if region != self._region:
@@ -72,7 +72,7 @@ class ProfilerPanel:
         self._tell()
 
     def plots(self) -> Plots:
-        """The chart of every target at the present values; none before there is a surface."""
+        """The chart of every target at the present values; none until there is a surface."""
         caption = "Each row: the model along one factor, the others where the sliders are; band 95 %; dashed: target."
         return {title: Plot(partial(self._draw, k), caption, 1.35) for k, title in enumerate(self._titles())}
 
@@ -143,7 +143,7 @@ class ProfilerPanel:
 
 
 def prediction_markdown(targets: Sequence[FittedTarget], natural: list[float]) -> str:
-    """Setting, prediction of every target with its interval, and what it is worth."""
+    """Setting, prediction of every target with its interval, and how far it can be trusted."""
     at = ", ".join(
         f"{escaped(factor.name)} = {parameter_value(factor.path, value)}"
         for factor, value in zip(targets[0].factors, natural, strict=True)

@@ -1,4 +1,4 @@
-"""The reports of the project's finished studies and diagnoses, read beside the scene or in a tab of their own."""
+"""The reports of the project's finished studies and diagnoses, to read beside the scene or in a tab of their own."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class ReportsPanel(Panel):
         self._list.on_update(lambda event: page.post(self._show) if event.client_id is not None else None)
 
     def show(self, now: Now) -> None:
-        """Offer what there is."""
+        """Offer the reports that there are now."""
         self._folders = {title(folder): folder for folder in self._page.project.reports}
         options = tuple(self._folders) or (NONE,)
         if tuple(self._list.options) != options:

@@ -1,4 +1,4 @@
-"""A list of the results in a folder, the present one first, and a text field for a folder from elsewhere."""
+"""A list of the results in a folder, the present one first, and a text field for a folder elsewhere."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from explorer.background.output_folder import checked_folder
 from explorer.viewer.actions import Post
 
 MOST = 40
-"""Results in the list."""
+"""Most results in the list."""
 
 
 class ResultChooser:
-    """``first``: the choice at the top, which is no folder. ``name``: the file that a result's folder holds."""
+    """``first``: the choice at the top, which is not a folder. ``name``: the file that a result's folder holds."""
 
     def __init__(
         self, server: viser.ViserServer, label: str, first: str, name: str, post: Post, chosen: Callable[[], None]
@@ -45,7 +45,7 @@ class ResultChooser:
         return self._folders.get(str(self._list.value))
 
     def offer(self, folders: Sequence[Path]) -> None:
-        """The finished results that there are now."""
+        """Update the list with the results that are finished now."""
         shown = list(dict.fromkeys(folder.absolute() for folder in (*reversed(self._added), *folders)))[:MOST]
         self._folders = dict(zip(titles(shown), shown, strict=True))
         options = (self._first, *self._folders)
@@ -61,12 +61,12 @@ class ResultChooser:
 
 
 def titles(folders: Sequence[Path]) -> list[str]:
-    """One for each of ``folders``, no two alike: with the folder above, or as a path, where another is called so."""
+    """A unique title for each of ``folders``: with the parent folder, or as a path, if the short one is not unique."""
     ways = (title, lambda folder: f"{folder.parent.name}/{folder.name}", str)
     used = [(way, Counter(map(way, folders))) for way in ways]
     return [next(way(folder) for way, count in used if count[way(folder)] == 1) for folder in folders]
 
 
 def title(folder: Path) -> str:
-    """Words for a result: its folder's name, and where that says little, the one above."""
+    """Title of a result: the name of its folder, with the parent folder's in front if the name alone says little."""
     return folder.name if any(c.isdigit() for c in folder.name) else f"{folder.parent.name}/{folder.name}"

@@ -1,4 +1,4 @@
-"""The design of experiments on the page: order, run, watch; charts, profiler, runs and comparison of its result."""
+"""The design of experiments on the page: order, run and watch a study; its charts, profiler, runs and comparison."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ PROFILED = "Move a slider: the charts follow."
 
 
 class StudyPanel(Panel):
-    """Talks to a :class:`StudyProcess`; what a result says is read and drawn by `explorer.report`."""
+    """Talks to a :class:`StudyProcess`; `explorer.report` reads and draws the results."""
 
     name, tab, every = "study", CALIBRATE, SELDOM
 
@@ -102,11 +102,11 @@ class StudyPanel(Panel):
             self._comparison = ComparisonPanel(server, post)
 
     def set_dark(self, dark: bool) -> None:
-        """Charts for a dark page, or a light one."""
+        """Draw charts for a dark page, or for a light one."""
         self._plots.dark = dark
 
     def show(self, now: Now) -> None:
-        """Ask the study how far it is."""
+        """Show how far the study is."""
         photographed = self._kept.now
         status = self._study.status()
         present = self._study.present if status.alive else None
@@ -132,7 +132,7 @@ class StudyPanel(Panel):
         self._show_board()
 
     def _expected(self, state: str, present: QueuedStudy | None) -> str:
-        """What the study at work takes, or the chosen profile; read anew for another one, and when a study ends."""
+        """Duration of the running study or the chosen profile; updated for another one and when a study ends."""
         study = self._loaded if present is None else present.study
         name = str(self._profile.value) if present is None else present.profile
         if (asked := (name, state, id(study))) != self._asked:
@@ -142,7 +142,7 @@ class StudyPanel(Panel):
         return self._takes
 
     def _resumable(self, status: CommandStatus) -> bool:
-        """Looked up anew when a study begins or ends: it reads folders."""
+        """Whether a study can be resumed; looked up only when a study changes state, because it reads folders."""
         if status.state != self._state:
             self._state, self._stopped = status.state, self._study.resumable()
         return self._stopped
@@ -154,7 +154,7 @@ class StudyPanel(Panel):
         self._study.queue(str(self._profile.value), self._order.edits)
 
     def _follow(self) -> None:
-        """Show the chosen result where it is another one than before."""
+        """Show the chosen result if it has changed."""
         folder = self._chooser.folder
         present = folder is None
         file = self._alive if present and self._study.status().alive else self._over
@@ -169,7 +169,7 @@ class StudyPanel(Panel):
             self._left_out = () if folder is None else load_excluded(folder)
             self._show_result(result, folder, shown)
         except (RecordError, CommandError) as error:
-            # A folder that somebody named may hold any JSON, also that of another version.
+            # A folder that a person named may hold any JSON, including that of another version.
             self._trouble = f"{folder}: cannot be shown ({error})"
             self._show_result(None, None, None)
 
@@ -181,7 +181,7 @@ class StudyPanel(Panel):
         self._comparison.show(result, folder, version)
 
     def _show_board(self) -> None:
-        """The board of what is chosen."""
+        """Show the board of the chosen result."""
         chosen, result = self._chooser.folder, self._result
         status = self._study.status() if chosen is None else None
         folder = chosen or self._present()
@@ -197,7 +197,7 @@ class StudyPanel(Panel):
         return self._result if isinstance(self._result, StudyResult) else None
 
     def _leave_out(self, result: StudyResult, excluded: Sequence[ExcludedRun]) -> None:
-        """Leave runs of ``result`` out, which must be the one that is shown."""
+        """Leave runs out of ``result``, which must be the result that is shown."""
         folder = self._chooser.folder or self._present()
         if result is not self._result or folder is None:
             raise CommandError("another study is now shown; open the table again")
@@ -205,7 +205,7 @@ class StudyPanel(Panel):
         self._left_out = tuple(excluded)
 
     def _open_run(self, asked: Mapping[str, object]) -> None:
-        """Pour a run of the result in the scene, as its row of the board asks."""
+        """Pour one run of the result in the scene, when a click on its row of the board asks for it."""
         result = self._result
         runs = [] if result is None else listed_runs(result)
         wanted = (asked.get("stage"), asked.get("label"), asked.get("seed"))
@@ -218,7 +218,7 @@ class StudyPanel(Panel):
             raise CommandError("program, study file or material has changed since that run: this pour may differ")
 
     def _record_order(self) -> tuple[Path, list[str]]:
-        """Folder of the shown study, and its command line."""
+        """Folder of the study that is shown, and its command line."""
         result, folder = self._result, self._chooser.folder or self._present()
         if not isinstance(result, StudyResult) or folder is None:
             raise CommandError("there is no finished study yet: start one, or choose one under Other results")
@@ -226,7 +226,7 @@ class StudyPanel(Panel):
         return folder, ["calibrate", "--headless", "--study", study.file, "--profile", study.profile.name]
 
     def _present(self) -> Path | None:
-        """Folder of the study that was started last, or before any the newest finished one."""
+        """Folder of the study that was started last; if none was started, that of the newest finished one."""
         return self._study.out or next(iter(self._study.finished()), None)
 
     def _set_live(self, values: Mapping[str, float | str]) -> None:
@@ -234,7 +234,7 @@ class StudyPanel(Panel):
 
 
 def profile_text(study: Study, name: str) -> str:
-    """What a profile of the study spends, e.g. "quick: coarse shapes, 83 runs"."""
+    """What a profile of the study costs, e.g. "quick: coarse shapes, 83 runs"."""
     profile = study.profiles[name]
     runs = "as many runs as the pilot asks for"
     if profile.resolution_deg is None:
@@ -243,13 +243,13 @@ def profile_text(study: Study, name: str) -> str:
 
 
 def running_markdown(order: QueuedStudy) -> str:
-    """Material, profile and target of the study at work: it may be another one than that on the page."""
+    """Material, profile and target of the running study, which may differ from the one on the page."""
     target = target_markdown(order.study.targets, order.photographed).replace(FROM_FILE, "")
     return f"**At work:** {escaped(order.study.scene.title)}, profile {escaped(order.profile)}. {target}"
 
 
 def target_markdown(targets: Sequence[Target], photographed: PhotographedTarget | None) -> str:
-    """The target of the next study, and where it is from."""
+    """The target of the next study, and its origin."""
     if photographed is not None:
         return f"**Target:** {escaped(photographed.line)}"
     if not targets:
@@ -268,7 +268,7 @@ def _target_text(target: Target) -> str:
 
 
 def set_live(session: Session, values: Mapping[str, float | str]) -> None:
-    """Give the live pour ``values`` (by path, SI): at once if all of them can act on a running pour, else anew."""
+    """Give the live pour ``values`` (by path, SI): at once if all can act on a running pour, else in a new pour."""
     scene: Scene = session.status().scene
     known = parameters(scene)
     if all(known[canonical(scene, path)].live for path in values):

@@ -1,1 +1,1 @@
-"""Pages of NiceGUI beside the page: tables that are filled in, and pictures that are clicked."""
+"""NiceGUI pages next to the main page: tables to fill in, and pictures to click."""

@@ -1,4 +1,4 @@
-"""What a follow-up asks for in tables: a row per quantity with a cell per pour, and the numbers of single bodies."""
+"""The values that a follow-up asks for, as tables: a row per quantity with a cell per pour, and single-body values."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ OF_POURS, OF_BODIES = "pours", "single bodies"
 HOW_OF_BODIES = "The mean of each number, and the standard error of that mean, in the unit of its row."
 NOTHING_ASKED = "The answer that is shown under Diagnose asks for no follow-up."
 WRAPPED = {"wrapText": True, "autoHeight": True}
-"""Cells of long texts."""
+"""Column options for cells with long texts."""
 SAVED = "Saved: {} of {} values are filled in."
 ROWS = "the rows of the follow-up"
 
 
 def follow_up_page(folder: Callable[[], Path | None], post: Post) -> TablePage:
-    """The page on which the follow-up in ``folder`` is filled in; None: the answer that is shown asks for none."""
+    """The page for filling in the follow-up in ``folder()``, which is None if the answer shown asks for none."""
     return TablePage("follow-up", TITLE, lambda: _build(folder, post))
 
 
@@ -83,7 +83,7 @@ def _saved(cells: Sequence[str]) -> str:
 
 
 def number_columns(tables: FollowUpTables) -> list[Column]:
-    """Quantity, place and unit, and a blue column per pour."""
+    """Columns for quantity, place and unit, and a blue column per pour."""
     heads = [column("Quantity", "quantity", minWidth=200, flex=2, pinned="left")]
     if any(row.x for row in tables.numbers):
         heads.append(column("At", "at", minWidth=90))
@@ -92,7 +92,7 @@ def number_columns(tables: FollowUpTables) -> list[Column]:
 
 
 def number_rows(tables: FollowUpTables) -> list[dict[str, str]]:
-    """A row per quantity and place; ``id``: its place among them."""
+    """A row per quantity and place; ``id`` is the number of the row."""
     rows = []
     for number, one in enumerate(tables.numbers):
         known = named(one.observable)
@@ -104,7 +104,7 @@ def number_rows(tables: FollowUpTables) -> list[dict[str, str]]:
 
 
 def filled_numbers(tables: FollowUpTables, sent: Sequence[object]) -> list[AskedNumber]:
-    """The numbers with the values of the rows that a browser ``sent``. CommandError for rows of another table."""
+    """The numbers of ``tables`` with the values that a browser ``sent``. CommandError for rows of another table."""
     return [
         replace(
             row,
@@ -117,7 +117,7 @@ def filled_numbers(tables: FollowUpTables, sent: Sequence[object]) -> list[Asked
 
 
 def body_columns() -> list[Column]:
-    """What is measured of which body, its unit, and two blue columns."""
+    """Columns for the body, the quantity, how to measure it and its unit, and two blue columns."""
     return [
         column("Body", "body", minWidth=100),
         column("Quantity", "quantity", minWidth=200, flex=2, **WRAPPED),
@@ -129,7 +129,7 @@ def body_columns() -> list[Column]:
 
 
 def body_rows(tables: FollowUpTables) -> list[dict[str, str]]:
-    """A row per number; ``id``: its place among them."""
+    """A row per number; ``id`` is the number of the row."""
     return [
         {
             "id": str(number),
@@ -145,7 +145,7 @@ def body_rows(tables: FollowUpTables) -> list[dict[str, str]]:
 
 
 def filled_bodies(tables: FollowUpTables, sent: Sequence[object]) -> list[AskedBody]:
-    """The same of single bodies."""
+    """The same as :func:`filled_numbers`, for single bodies."""
     return [
         replace(row, **{key: entered_text(cells.get(key), f"{row.body}, {key}") for key in ("mean", "standard_error")})
         for row, cells in zip(tables.bodies, rows_in_order(sent, len(tables.bodies), ROWS), strict=True)

@@ -1,4 +1,4 @@
-"""A page that is one table to edit: what its pages have in common."""
+"""What the pages with a table to edit have in common."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from explorer.viewer.actions import Action, Post
 from explorer.viewer.tables.table_server import LOST, REPLY, done_by
 
 Column = dict[str, object]
-"""Of AG Grid."""
+"""A column definition of AG Grid."""
 WRITTEN: Column = {"editable": True, "cellStyle": {"background": "rgba(31,110,165,0.08)"}}
-"""Of a column that a person fills in: blue, as the pages say."""
+"""Options of a column that a person fills in: blue, as the texts on the pages say."""
 LONGEST_TEXT = 200
 
 
 def column(head: str, field: str, **more: object) -> Column:
-    """A column that sorts and filters, its head on several lines."""
+    """A column that can be sorted and filtered, with a header that wraps."""
     usual = {"sortable": True, "filter": "agTextColumnFilter", "cellDataType": "text", "flex": 1}
     return {"headerName": head, "field": field, "wrapHeaderText": True, "autoHeaderHeight": True} | usual | more
 
 
 def with_unit(name: str, unit: str | None) -> str:
-    """The head of a column."""
+    """The header of a column: its name, followed by its unit if it has one."""
     return f"{name} [{unit}]" if unit else name
 
 
 def entered_text(value: object, where: str) -> str:
-    """What a person entered, in one line. Raises CommandError for one that is too long."""
+    """What a person entered, on one line. Raises CommandError if it is too long."""
     text = " ".join(str("" if value is None else value).split())
     if len(text) > LONGEST_TEXT:
         raise CommandError(f"{where}: {len(text)} characters; allowed: up to {LONGEST_TEXT}")
@@ -36,9 +36,9 @@ def entered_text(value: object, where: str) -> str:
 
 
 def rows_in_order(sent: Sequence[object], number: int, whose: str) -> list[Mapping[str, object]]:
-    """The ``number`` rows that a browser ``sent``, in whatever order it shows them, by their ``id``: 0, 1, …
+    """The ``number`` rows that a browser ``sent`` in any order, sorted by their ``id``: 0, 1, …
 
-    Raises CommandError for other rows than those ``whose`` says, such as "the runs of the study".
+    Raises CommandError if the rows are not the expected ones; ``whose`` names these, such as "the runs of the study".
     """
     found = {str(row.get("id")): row for row in sent if isinstance(row, Mapping)}
     if set(found) != {str(k) for k in range(number)}:
@@ -47,7 +47,7 @@ def rows_in_order(sent: Sequence[object], number: int, whose: str) -> list[Mappi
 
 
 def table_heading(title: str, how: str) -> None:
-    """Title, and what can be done here."""
+    """Show the title, and what a person can do here."""
     from nicegui import ui
 
     ui.label(title).classes("text-h6").props("role=heading aria-level=1")
@@ -61,9 +61,9 @@ def table_to_edit(
     post: Post,
     height: str = "calc(100vh - 12rem)",
 ) -> None:
-    """A table with *Save*: ``entered`` makes of the rows that a browser sent what is to be done, and what is then told.
+    """A table with *Save*: ``entered`` turns the rows from the browser into an action, and a message for its success.
 
-    A CommandError of either is told below the table. ``height``: of the table, as CSS has it.
+    A CommandError from either ``entered`` or the action is shown below the table. ``height``: CSS height of the table.
     """
     from nicegui import ui
 

@@ -1,4 +1,4 @@
-"""The photograph that is read, to be clicked: two points of the base line, and both ends of a known length."""
+"""The photograph to read, for clicking two points of the base line and both ends of a known length."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ HOW = (
 )
 TAKEN = "Taken for {}: now Read the angle."
 MOST_SHOWN = 1800
-"""Longest side of the picture as it is shown [px]; clicks are told in pixels of the picture itself."""
+"""Longest side of the picture as it is shown [px]; clicks are reported in pixels of the picture itself."""
 COLOURS = {BASE: "#e69f00", LENGTH: "#56b4e9"}
 
 
 @dataclass
 class PhotographInHand:
-    """The photograph that is read: ``chosen`` gives its file or name, ``take`` the marks that a person made in it."""
+    """The photograph to read: ``chosen`` returns its file or name, ``take`` receives the marks that a person made."""
 
     chosen: Callable[[], str]
     take: Callable[[str, Marks], None]
@@ -43,9 +43,9 @@ class PhotographInHand:
 
 @dataclass
 class Clicks:
-    """Points of a picture of ``width`` [px] that were clicked, by what they mark; two of each at most.
+    """Clicked points of a picture of ``width`` [px], by what they mark; at most two each.
 
-    ``across``, ``down``: pixels of the picture in one of what is shown.
+    ``across``, ``down``: pixels of the picture per pixel that is shown.
     """
 
     width: int
@@ -54,13 +54,13 @@ class Clicks:
     points: dict[str, list[Point]] = field(default_factory=lambda: {BASE: [], LENGTH: []})
 
     def add(self, what: str, x: float, y: float) -> None:
-        """One more, from the top left corner of what is shown; the third begins anew."""
+        """Add a point, measured from the top left corner of what is shown; the third point starts over."""
         point = (x * self.across - 0.5, y * self.down - 0.5)
         before = self.points[what]
         self.points[what] = [point] if len(before) == 2 else [*before, point]
 
     def marks(self, length_mm: float | None) -> Marks:
-        """What is marked by two points each. Raises CommandError where one point is missing, or nothing is marked."""
+        """The marks that two points each define. Raises CommandError if one of two points is missing."""
         for what, points in self.points.items():
             if len(points) == 1:
                 raise CommandError(f"{what.lower()}: one point is marked; click the other one")
@@ -72,7 +72,7 @@ class Clicks:
         return marks
 
     def drawn(self) -> str:
-        """The points and the lines between them as SVG of the picture that is shown."""
+        """The points and the lines between them, as SVG for the picture that is shown."""
         shapes = []
         for what, points in self.points.items():
             places = [((x + 0.5) / self.across, (y + 0.5) / self.down) for x, y in points]
@@ -85,7 +85,7 @@ class Clicks:
 
 
 def marks_page(in_hand: PhotographInHand, post: Post) -> TablePage:
-    """The page on which the photograph in hand is marked."""
+    """The page for marking the photograph in hand."""
     return TablePage("photograph", TITLE, lambda: _build(in_hand, post))
 
 
@@ -125,7 +125,7 @@ def _build(in_hand: PhotographInHand, post: Post) -> None:
 
 
 def shown_picture(picture: Picture) -> tuple[str, Clicks]:
-    """A photograph as the program sees it, no larger than is shown, as the address of an image; and clicks in it."""
+    """A photograph as the program sees it, scaled down to the size shown, as a data URL, and the clicks in it."""
     shown = Image.fromarray(np.clip(np.rint(picture.grey), 0, 255).astype(np.uint8))
     across, down = shown.width * picture.reduced, shown.height * picture.reduced
     shown.thumbnail((MOST_SHOWN, MOST_SHOWN))

@@ -20,9 +20,9 @@ HOW = (
 SAVED = "Saved: the next study starts from these ranges."
 ENTERED = {"low": "Low", "high": "High", "measured": "Measured value"}
 Range = tuple[float, float, float]
-"""Low, high and measured value, in the unit that is shown."""
+"""Low, high and measured value, in the displayed unit."""
 NUMBERS = CellTable((), (), decimal_comma=True)
-"""Reads a number with a decimal comma, or with a point."""
+"""Reads a number with a decimal comma or a decimal point."""
 
 
 @dataclass(frozen=True)
@@ -37,14 +37,14 @@ class RangeRow:
 
 @dataclass(frozen=True)
 class RangesInHand:
-    """The ranges that the next study starts from, and who takes others, by the factors' names."""
+    """The ranges that the next study starts from; ``take`` receives changed ranges by the names of the factors."""
 
     rows: Callable[[], Sequence[RangeRow]]
     take: Callable[[Mapping[str, Range]], None]
 
 
 def ranges_page(in_hand: RangesInHand, post: Post) -> TablePage:
-    """The page on which the ranges in hand are changed."""
+    """The page for changing the ranges in hand."""
     return TablePage("ranges", TITLE, lambda: _build(in_hand, post))
 
 
@@ -67,7 +67,7 @@ def _cells(row: RangeRow) -> dict[str, str]:
 
 
 def entered_ranges(rows: Sequence[RangeRow], sent: Sequence[object]) -> dict[str, Range]:
-    """The ranges that a browser ``sent`` for ``rows``. Raises CommandError for what is no number."""
+    """The ranges that a browser ``sent`` for ``rows``. Raises CommandError for a cell that is not a number."""
     found = {str(row.get("name")): row for row in sent if isinstance(row, Mapping)}
     ranges: dict[str, Range] = {}
     for row in rows:

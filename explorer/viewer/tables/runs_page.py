@@ -1,4 +1,4 @@
-"""The runs of a study's response surface in a table, and why one of them is left out."""
+"""The runs of a study's response surface in a table, with the reason for each run that is left out."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ REASON = "reason"
 
 @dataclass(frozen=True)
 class RunsInHand:
-    """The finished study that is shown (None: there is none), what is left out of it, and who takes other runs."""
+    """The finished study that is shown, if any, and the runs left out of it; ``take`` receives a new list of those."""
 
     result: Callable[[], StudyResult | None]
     excluded: Callable[[], Sequence[ExcludedRun]]
@@ -42,7 +42,7 @@ class RunsInHand:
 
 
 def runs_page(in_hand: RunsInHand, post: Post) -> TablePage:
-    """The page on which runs are left out."""
+    """The page for leaving runs out."""
     return TablePage("runs", TITLE, lambda: _build(in_hand, post))
 
 
@@ -65,14 +65,14 @@ def _build(in_hand: RunsInHand, post: Post) -> None:
 
 
 def _heads(result: StudyResult) -> dict[str, str]:
-    """Field of a row → head of its column."""
+    """Field of a row → header of its column."""
     factors = {one.name: with_unit(one.name, unit_of_parameter(one.path).symbol) for one in result.surface.factors}
     observables = {name: observable_label(name) for name in result.surface.observables}
     return {"setting": "Setting"} | factors | {"seed": "Seed", "outcome": "Outcome"} | observables
 
 
 def run_rows(result: StudyResult, excluded: Sequence[ExcludedRun]) -> list[dict[str, str]]:
-    """Every run of the surface; ``id``: its place among them."""
+    """Every run of the surface; ``id`` is the number of the run."""
     surface = result.surface
     rows: list[dict[str, str]] = []
     for runs, point in zip(surface.runs, surface.natural, strict=True):
@@ -89,7 +89,7 @@ def run_rows(result: StudyResult, excluded: Sequence[ExcludedRun]) -> list[dict[
 
 
 def excluded_runs(result: StudyResult, sent: Sequence[object]) -> list[ExcludedRun]:
-    """The runs with a reason, of the rows that a browser ``sent``. Raises CommandError for rows of another study."""
+    """The runs with a reason among the rows that a browser ``sent``. Raises CommandError for another study's rows."""
     runs = [run for row in result.surface.runs for run in row]
     excluded = []
     for run, row in zip(runs, rows_in_order(sent, len(runs), "the runs of the study"), strict=True):

@@ -1,4 +1,4 @@
-"""The sheet of a designed experiment, filled in on the page: results, and why a run is left out."""
+"""The sheet of a designed experiment, for entering results, and the reason where a run is left out."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from solver.assets import asset_path
 
 TITLE = "Sheet of runs"
 SAVED_AS = "_filled"
-"""Behind the name of a sheet, in that of what was filled in."""
+"""Suffix that the name of a filled-in sheet gets."""
 KEPT_NAME = re.compile(rf"({SAVED_AS})?(-[0-9a-f]{{12}})?$")
-"""What was put behind the name of a sheet when it was kept."""
+"""What was appended to the name of a sheet when it was kept."""
 MOST_CELLS = 20_000
-"""More do not fit into one message of a browser."""
+"""More cells do not fit into one message from a browser."""
 HOW = (
     "Enter the results in the blue columns; a click on a head sorts, the sign in it filters. A run with a reason under "
     "excluded is left out of the analysis, which says so. Save, and the sheet is chosen under Filled sheet → model and "
@@ -38,13 +38,13 @@ SAVED = "Saved, and chosen under Filled sheet → model and optimum: {}."
 
 @dataclass
 class SheetInHand:
-    """The sheet that is analysed; ``slot`` is where it is chosen, None on a page without that panel."""
+    """The sheet to analyse; ``slot`` is where a person chooses it, None on a page without that panel."""
 
     slot: UploadSlot | None = None
 
     @property
     def path(self) -> Path:
-        """Of the sheet. Raises CommandError where there is none."""
+        """Path of the sheet. Raises CommandError if there is none."""
         if self.slot is None:
             raise CommandError("no sheet is chosen")
         return asset_path("runs", self.slot.chosen)
@@ -56,7 +56,7 @@ class SheetInHand:
 
 
 def sheet_page(sheet: SheetInHand, post: Post) -> TablePage:
-    """The page on which the sheet in hand is filled in."""
+    """The page for filling in the sheet in hand."""
     return TablePage("sheet", TITLE, lambda: _build(sheet, post))
 
 
@@ -85,7 +85,7 @@ def editable(sheet: Sheet) -> tuple[str, ...]:
 
 
 def column_definitions(sheet: Sheet) -> list[Column]:
-    """Of AG Grid: one per column, that of exclusions last even where the sheet has none yet."""
+    """AG Grid definitions, one per column; a sheet without a column for exclusions gets one at the end."""
     written = editable(sheet)
     units = {factor.name: factor.unit for factor in sheet.factors} | {
         k: unit for k, unit in sheet.units.items() if unit
@@ -99,7 +99,7 @@ def column_definitions(sheet: Sheet) -> list[Column]:
 
 
 def rows_of(sheet: Sheet) -> list[dict[str, str]]:
-    """The cells by the position of their column; ``line`` is the row's line in the file."""
+    """Rows of cells, keyed by the position of their column; ``line`` is the row's line in the file."""
     width = len(_columns(sheet))
     return [
         {"line": str(line)} | {str(k): cell for k, cell in enumerate((*cells, *[""] * (width - len(cells))))}
@@ -108,10 +108,10 @@ def rows_of(sheet: Sheet) -> list[dict[str, str]]:
 
 
 def filled_sheet(sheet: Sheet, rows: Sequence[Mapping[str, object]]) -> tuple[str, bytes]:
-    """Name and content (CSV) of ``sheet`` with the cells that a person filled in, in its own order.
+    """Name and content (CSV) of ``sheet`` with the cells that a person filled in, in the order of the sheet.
 
-    Only columns that are his to fill in are taken from ``rows``, which a browser sent. Raises CommandError where a
-    result is no number, or the rows are not those of the sheet.
+    ``rows`` come from a browser; only the editable columns are taken from them. Raises CommandError if a result is not
+    a number, or if the rows are not those of the sheet.
     """
     sent = {str(row.get("line")): row for row in rows if isinstance(row, Mapping)}
     if sorted(sent) != sorted(map(str, sheet.lines)):
@@ -136,13 +136,13 @@ def filled_sheet(sheet: Sheet, rows: Sequence[Mapping[str, object]]) -> tuple[st
         [header, *table]
     )
     stem = KEPT_NAME.sub("", sheet.path.stem)
-    content = text.getvalue().encode("utf-8-sig")  # by the mark spreadsheets know it
+    content = text.getvalue().encode("utf-8-sig")  # spreadsheets recognise the encoding by its mark
     _check(content, [tuple(row) for row in table])
     return f"{stem}{SAVED_AS}.csv", content
 
 
 def _columns(sheet: Sheet) -> list[str]:
-    """Names of the columns in their order, with that of exclusions; unnamed ones are kept."""
+    """Names of the columns in order, including the one for exclusions; columns without a name are kept."""
     names = [""] * len(sheet.table.rows[0][1])
     for name, position in sheet.columns.items():
         names[position] = name
@@ -150,7 +150,7 @@ def _columns(sheet: Sheet) -> list[str]:
 
 
 def _entered(line: int, name: str, value: object, before: str) -> str:
-    """A cell as it was entered, in one line; as it was where nobody has changed it."""
+    """A cell as entered, on one line; a cell that nobody changed stays exactly as it was."""
     text = str("" if value is None else value)
     if text == before:
         return before
@@ -158,7 +158,7 @@ def _entered(line: int, name: str, value: object, before: str) -> str:
 
 
 def _numbers(sheet: Sheet, cells: Sequence[str]) -> list[bool]:
-    """Of each cell that is not empty, whether it is a number."""
+    """For each cell that is not empty, whether it is a number."""
     return [not math.isnan(sheet.table.number(cell)) for cell in cells if cell not in EMPTY_CELLS]
 
 
@@ -167,7 +167,7 @@ def _mixed(sheet: Sheet, cells: Sequence[str]) -> bool:
 
 
 def _check_column(sheet: Sheet, name: str, cells: Sequence[str]) -> None:
-    """Refuse a word among numbers; a column may be words as a whole."""
+    """Refuse a word among numbers; a column may consist of words only."""
     if not _mixed(sheet, cells):
         return
     for line, cell in zip(sheet.lines, cells, strict=True):
@@ -178,7 +178,7 @@ def _check_column(sheet: Sheet, name: str, cells: Sequence[str]) -> None:
 
 
 def _check(content: bytes, table: Sequence[tuple[str, ...]]) -> None:
-    """Whether what is written is read as it was meant; raises CommandError where it is not."""
+    """Raise CommandError if ``content`` does not read back as ``table``."""
     with tempfile.TemporaryDirectory() as apart:
         path = Path(apart) / "sheet.csv"
         path.write_bytes(content)

@@ -1,9 +1,9 @@
-"""Tables that are filled in and pictures that are clicked: pages of NiceGUI on a port of their own of this machine.
+"""Tables to fill in and pictures to click: NiceGUI pages on a port of their own on this machine.
 
-viser has no table to edit and no picture to click. NiceGUI (an extra, ``pip install 'repose-explorer[tables]'``) has
-both. Its server starts with the first page that is asked for, listens on a loopback address only, and is behind the
-rules of the page: a Host and an Origin of its own, no request that another site makes, and the page's token, whose
-cookie a browser sends to every port of a host. What a person does there is posted to the page's loop, as everything is.
+viser has no editable table and no clickable picture. NiceGUI (an extra, ``pip install 'repose-explorer[tables]'``) has
+both. Its server starts with the first request for one of its pages and listens on a loopback address only. The rules of
+the main page apply: its own Host and Origin, no requests from other sites, and the page's token, whose cookie a browser
+sends to every port of a host. What a person does there is posted to the page's loop, like every other action.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from explorer.viewer.shell.web_pages import GUARD, HTML, WebPage, WebPages
 
 HOST = "127.0.0.1"
 ADDRESS = "/tables/"
-"""On the page's own port; each address there leads to the page of the same name on the other."""
+"""Path on the main page's port; each address under it leads to the page of the same name on the NiceGUI port."""
 MISSING = "Tables need NiceGUI, which is not installed: pip install 'repose-explorer[tables]', and start again."
 ELSEWHERE = "Tables open on the machine of the program only, at 127.0.0.1 or localhost; take the file along instead."
 FAILED = "Tables cannot be served ({}); start the program again."
 LOADING = "The tables are being loaded …"
 MOST_CONNECTIONS, MOST_MESSAGE_BYTES = 64, 4_000_000
 FAREWELL = 2.0
-"""Seconds in which the server has to end."""
+"""Seconds that the server has to end."""
 BRAND = "#1f6ea5"
-"""Of buttons: white on it has a contrast of 5.5 : 1."""
+"""Colour of buttons: white text on it has a contrast of 5.5 : 1."""
 REPLY = 30.0
-"""Seconds in which a browser has to have sent its table, and the page's loop to have done what was posted."""
+"""Seconds that a browser has to send its table, and that the page's loop has to carry out what was posted."""
 LOST = "Not saved: the browser has not sent the table."
 BUSY = f"Not done: the page has not answered in {REPLY:g} s."
 LEAD_ON = """<!doctype html><title>Tables</title><p>{said}</p><script>
@@ -53,7 +53,7 @@ new MutationObserver(() => {
   for (const one of bars) one.setAttribute("aria-label", "Loading");
 }).observe(document.documentElement, {childList: true, subtree: true});
 </script>"""
-"""What a screen reader asks for and NiceGUI leaves out."""
+"""Adds what a screen reader needs and NiceGUI leaves out."""
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -63,7 +63,7 @@ Application = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 @dataclass(frozen=True)
 class TablePage:
-    """A page by its ``name`` in the address; ``build`` fills it, whenever a browser opens it."""
+    """A page with its ``name`` in the address; ``build`` fills it whenever a browser opens it."""
 
     name: str
     title: str
@@ -71,7 +71,7 @@ class TablePage:
 
 
 class TableServer:
-    """Leads from ``pages`` to pages of NiceGUI; ``token``: what a browser has to have shown to the page."""
+    """Leads from ``pages`` to NiceGUI pages; ``token`` is what a browser must have presented to the main page."""
 
     def __init__(self, pages: WebPages, token: str | None) -> None:
         self._pages, self._token = pages, token
@@ -83,7 +83,7 @@ class TableServer:
         self._trouble = ""
 
     def publish(self, page: TablePage) -> str:
-        """Serve ``page`` from the next start of the server on; returns its address on the page's port."""
+        """Serve ``page`` from the next start of the server on; returns its address on the main page's port."""
         self._made[page.name] = page
         self._pages.publish_made(ADDRESS + page.name, lambda: self._lead_on(page.name))
         return ADDRESS + page.name
@@ -96,7 +96,7 @@ class TableServer:
             self._thread.join(FAREWELL)
 
     def _lead_on(self, name: str) -> WebPage:
-        """The page that leads to the other port, and starts its server before that."""
+        """Start the server of the other port if necessary, and return the page that leads there."""
         with self._lock:
             if self._thread is None:
                 self._thread = threading.Thread(target=self._serve, name="tables", daemon=True)
@@ -108,12 +108,12 @@ class TableServer:
         return WebPage(HTML, text.encode())
 
     def _serve(self) -> None:
-        """Serve until :meth:`close`; the page that leads here tells what kept it from that."""
+        """Serve until :meth:`close`; if that fails, the page that leads here shows the reason."""
         try:
             self._run()
         except ImportError:
             self._trouble = MISSING
-        except (Exception, SystemExit) as error:  # whatever a server's start may raise: the page waits for it
+        except (Exception, SystemExit) as error:  # whatever the start of a server may raise: the page waits for it
             self._trouble = FAILED.format(error)
 
     def _run(self) -> None:
@@ -140,9 +140,9 @@ class TableServer:
 
 
 class TableGuard:
-    """``application`` for those whom the page would serve; others are refused.
+    """Passes a request on to ``application`` if the main page would serve it, and refuses any other.
 
-    A browser may come from the page by a link (another port of the same site); everything else has to come from here.
+    A browser may follow a link from the main page (another port of the same site); all else must come from this port.
     """
 
     def __init__(self, application: Application, port: int, token: str | None) -> None:
@@ -165,7 +165,7 @@ class TableGuard:
             await send({"type": "http.response.body", "body": f"{refused.phrase}\n".encode()})
 
     def _refusal(self, scope: Scope) -> HTTPStatus | None:
-        """Why this request is refused; None where it is not."""
+        """Why this request is refused; None if it is not."""
         hosts = [value.lower() for value in _headers(scope, b"host")]
         if len(hosts) != 1 or hosts[0] not in self._hosts:
             return HTTPStatus.MISDIRECTED_REQUEST
@@ -193,7 +193,7 @@ def _headers(scope: Scope, name: bytes) -> list[str]:
 
 
 def _guarded(send: Send) -> Send:
-    """``send`` with the headers that every page of this program has."""
+    """``send``, with the headers that every page of this program has."""
     added = [(key.lower().encode(), value.encode()) for key, value in GUARD.items()]
 
     async def send_guarded(message: MutableMapping[str, Any]) -> None:
@@ -205,11 +205,11 @@ def _guarded(send: Send) -> Send:
 
 
 async def done_by(post: Post, act: Callable[[], None]) -> str:
-    """Let the page's loop carry out ``act``; why it was refused, empty where it was not."""
+    """Have the page's loop carry out ``act``; returns why it was refused, empty if it was not."""
     done: Future[str] = Future()
 
     def carry_out() -> None:
-        if not done.set_running_or_notify_cancel():  # it came too late: whoever asked was told so
+        if not done.set_running_or_notify_cancel():  # too late: the caller has already been told so
             return
         try:
             act()
@@ -229,5 +229,5 @@ async def done_by(post: Post, act: Callable[[], None]) -> str:
 
 
 def link_html(where: str, words: str) -> str:
-    """A link to a page of tables, in a tab of its own."""
+    """A link that opens a page of tables in a tab of its own."""
     return f"<a href='{escape(where)}' target='_blank' rel='noopener'>{escape(words)}</a>"
