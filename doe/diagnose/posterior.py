@@ -432,15 +432,15 @@ class _Weigher:
         weighed = logs + (nodes.share if len(nodes.share) else -math.log(len(logs)))
         weights = np.exp(weighed - logsumexp(weighed))
         sizes = {way.effect: len(way.unit) for way in self._emulator.ways}
-        effects = [] if label == "base" else label.split("+")
-        owners = [(effect, index) for effect in effects for index in range(sizes[effect])]
-        amplitudes = tuple(
-            Amplitude(effect, index, *_spread_of(nodes.natural[:, column], weights), bool(nodes.ends[best]))
-            for column, (effect, index) in enumerate(owners)
-        )
+        amplitudes: list[Amplitude] = []
+        for effect in [] if label == "base" else label.split("+"):
+            own = nodes.natural[:, len(amplitudes) : len(amplitudes) + sizes[effect]]
+            for index, value in enumerate(_towards(own, best, weights)):
+                interval, end = _interval(own[:, index], weights), bool(nodes.ends[best])
+                amplitudes.append(Amplitude(effect, index, float(value), *interval, end))
         return Fit(
             label,
-            amplitudes,
+            tuple(amplitudes),
             theta,
             covariance,
             slopes,
@@ -453,9 +453,20 @@ class _Weigher:
         )
 
 
-def _spread_of(values: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
-    """Mean and 95 % interval of ``values`` with ``weights``, interpolated linearly between them."""
+def _towards(natural: FloatArray, best: int, weights: FloatArray) -> FloatArray:
+    """Mean amplitudes (p,) of the nodes ``natural`` (n, p) with the sign, or within 45° of the direction, of the best.
+
+    Over all signs or directions the mean is near zero where the data do not tell them apart, and nobody's amplitude.
+    """
+    sizes = np.linalg.norm(natural, axis=1)
+    near = natural @ natural[best] > (math.sqrt(0.5) - 1e-9) * sizes * sizes[best]
+    mean, size = weights[near] @ natural[near], weights[near] @ sizes[near] / weights[near].sum()
+    return np.asarray(size * mean / np.linalg.norm(mean), dtype=np.float64)
+
+
+def _interval(values: FloatArray, weights: FloatArray) -> tuple[float, float]:
+    """95 % interval of ``values`` with ``weights``, interpolated linearly between them."""
     order = np.argsort(values)
     below = np.cumsum(weights[order]) - 0.5 * weights[order]
     low, high = np.interp([0.025, 0.975], below, values[order])
-    return float(weights @ values), float(low), float(high)
+    return float(low), float(high)

@@ -20,7 +20,8 @@ BODIES_ALONE = "single bodies, without a pour"
 
 @dataclass(frozen=True)
 class Amplitude(Record):
-    """One amplitude of one effect in natural units: posterior mean and 95 % interval.
+    """One amplitude of one effect in natural units: posterior mean with the sign or direction of the best fit, and 95 %
+    interval over all of them.
 
     ``at_end``: whether the best amplitude is the largest that the models reach, or that the literature supports.
     """
