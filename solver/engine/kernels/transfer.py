@@ -96,7 +96,7 @@ def load_bodies(s: ti.template(), w: ti.i32, numbers: Table, places: IntTable, s
         s.member.local[w, m] = triple(spheres, m, 0)
         s.member.radius[w, m] = spheres[m, 3]
         s.member.body[w, m] = owner[m, 0]
-        s.body.swing[w, owner[m, 0]] = ti.max(s.body.swing[w, owner[m, 0]], s.member.local[w, m].norm())
+        ti.atomic_max(s.body.swing[w, owner[m, 0]], s.member.local[w, m].norm())  # members of a body run at once
 
 
 @ti.kernel

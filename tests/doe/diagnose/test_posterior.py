@@ -36,7 +36,6 @@ from doe.diagnose.posterior import (
     multiples,
     posterior,
 )
-from doe.diagnose.posterior import _interval as interval_of
 from doe.errors import StatisticsError
 from doe.validation.cross_validation import NULLS, PlantedTruth, Teaching, cross_validated
 from doe.validation.limit import RISKS, DataKind
@@ -268,20 +267,6 @@ def test_an_effect_in_the_plane_is_found_in_every_direction(degrees):
     assert abs((off + 180.0) % 360.0 - 180.0) < 12.0
 
 
-def test_of_a_direction_that_nothing_tells_the_amplitude_is_not_averaged_away():
-    even = 6.0 * unit(0, 8)
-    (x, y) = (one.value for one in judged(planar([even] * 4), 0.7 * even).fits["tilt"].amplitudes)
-    assert math.hypot(x, y) == pytest.approx(1.4, rel=0.1)
-
-
-def test_of_a_sign_that_nothing_tells_the_amplitude_is_not_averaged_away():
-    even, ways = 6.0 * unit(0, 8), (Way("mass", "mass +", (0.3,)), Way("mass", "mass -", (-0.3,)))
-    (found,) = judged(emulator({"up": even, "down": even}, ways=ways), 0.7 * even).fits["mass"].amplitudes
-    # Six pours of data know it to 0.41/6 of itself, and the mean is over a prior even in the logarithm.
-    assert abs(found.value) == pytest.approx(0.21, rel=0.15)
-    assert found.low < -0.15 < 0.15 < found.high
-
-
 def test_weights_in_the_plane_interpolate():
     for angle in ANGLES:
         weights = planar_weights(angle)
@@ -319,15 +304,6 @@ def test_an_effect_that_nobody_could_see_is_no_second_one(size, weighed):
     taught = emulator({"push": 4.0 * unit(0, 8), "faint": size * unit(3)}, variance=1.0)
     found = judged(taught, 3.0 * unit(0, 8) + 0.5 * unit(3), pairs=True)
     assert ("push+faint" in found.effects) == weighed
-
-
-def test_an_amplitude_s_interval_is_that_of_its_weights():
-    """Nodes 0.1 apart with the weights of a normal number of deviation 0.7 about 1; half of a step is 0.05."""
-    nodes = np.random.default_rng(0).permutation(np.arange(-4.0, 6.05, 0.1))
-    weights = stats.norm.pdf(nodes, 1.0, 0.7)
-    assert interval_of(nodes, weights / weights.sum()) == pytest.approx(
-        stats.norm.ppf([0.025, 0.975], 1.0, 0.7), abs=5e-3
-    )
 
 
 def test_two_effects_are_weighed_where_the_best_one_does_not_fit():

@@ -11,7 +11,7 @@ from solver.engine.kernels.geometry import nearest_on_revolved
 from solver.engine.state import Vec3, Vec4
 from solver.engine.tables import body_tables
 from solver.engine.world import SUMMARY_COLUMNS, Batch
-from solver.pours.run import Job, run_pours
+from solver.pours.run import Job, capacity_for, run_pours
 from solver.scenes.insertion import rotation_matrix
 from solver.scenes.material_file import load_material
 from solver.scenes.scene import with_values
@@ -107,3 +107,15 @@ def test_a_list_that_does_not_fit_is_built_with_narrow_margins():
     row = dict(zip(SUMMARY_COLUMNS, batch.advance(np.array([200], dtype=np.int32))[0], strict=True))
     assert row["overflow"] == 0
     assert batch.bodies(0, len(crowd))[:, 0] == pytest.approx(crowd[:, 0] + 3.0 * 200 * lab.dt)
+
+
+def test_a_body_swings_as_far_as_its_farthest_member_whichever_thread_loads_it():
+    """Two threads load a world, each a share of the members; a body of theirs may lie on the border."""
+    scene = with_values(load_material("sunflower_extract"), {"rig.mass": "60g"})
+    bodies = body_tables(scene, np.arange(60, dtype=np.int32) % len(scene.bodies))
+    expected = np.zeros(60)
+    np.maximum.at(expected, bodies.owner[:, 0], np.linalg.norm(bodies.spheres[:, :3], axis=1))
+    batch = Batch(capacity_for([scene], 1))
+    for _ in range(50):
+        batch.load(0, scene, bodies, 1e-6, [True] * len(scene.rig.surfaces()))
+        assert batch._s.body.swing.to_numpy()[0, :60] == pytest.approx(expected, rel=1e-12)
