@@ -31,8 +31,8 @@ DRAWS = 400
 """Simulated data sets per answer."""
 PLANNED, GIVEN_UP = (6, 12, 24), 0.05
 """Numbers of pours that may be asked of a laboratory, and the loss of chance accepted for fewer."""
-LEAST_WEIGHT, LARGEST_LOG = 1e-300, 700.0
-"""Of an answer, and of odds, so that both stay finite."""
+LEAST_WEIGHT = 1e-300
+"""Of an answer, so that its logarithm is finite."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def chance_of_an_answer(
             white = np.linalg.solve(factors[j], (drawn - item.predictions[other].mean).T)
             log_likelihood = -np.log(np.diag(factors[j])).sum() - 0.5 * (white**2).sum(axis=0)
             logs.append(np.log(prior[j]) + TEMPERATURE * log_likelihood)
-        odds = np.exp(np.minimum(np.stack(logs) - logs[k], LARGEST_LOG))
+        odds = np.exp(np.stack(logs) - np.max(logs, axis=0))
         without = np.array([not holds(other, name) for other in names])
         right, wrong = odds[~without].sum(axis=0), odds[without].sum(axis=0)
         if without.any():

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.errors import MeasurementError
+from doe.measurement.scans import replicate_files
 from solver import (
     OBSERVABLES,
     HeightMap,
@@ -53,17 +54,7 @@ PROFILE_PLACES = (np.arange(30) + 0.5) * 5e-3
 
 def pile_files(folder: Path, conditions: Iterable[str]) -> tuple[dict[str, dict[int, Path]], tuple[Path, ...]]:
     """Return the files of ``folder/piles`` by condition and replicate, and those that belong to no condition."""
-    found: dict[str, dict[int, Path]] = {name: {} for name in conditions}
-    strangers = []
-    for path in sorted((folder / "piles").glob("*")):
-        name, _, number = path.stem.rpartition("_")
-        if path.suffix == ".npz" and name in found and number.isdecimal() and int(number) >= 1:
-            if int(number) in found[name]:
-                raise MeasurementError(f"{path}: replicate {int(number)} has more than one scan; allowed: one file")
-            found[name][int(number)] = path
-        else:
-            strangers.append(path)
-    return found, tuple(strangers)
+    return replicate_files(folder / "piles", conditions, lambda suffix: suffix == ".npz")
 
 
 def read_piles(files: Mapping[int, Path], scene: Scene) -> dict[int, Pile]:

@@ -14,7 +14,7 @@ Only the upper surface is used: in each cell, as wide as the scan's resolution, 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Protocol
@@ -129,14 +129,23 @@ class Scan:
 
 def scan_files(folder: Path, conditions: Iterable[str]) -> tuple[dict[str, dict[int, Path]], tuple[Path, ...]]:
     """Return the files of ``folder/scans`` by condition and replicate, and those that belong to no condition."""
+    return replicate_files(folder / "scans", conditions, lambda suffix: suffix.lower() in SUFFIXES)
+
+
+def replicate_files(
+    folder: Path, conditions: Iterable[str], known: Callable[[str], bool]
+) -> tuple[dict[str, dict[int, Path]], tuple[Path, ...]]:
+    """Return files ``<condition>_<k>`` of a ``known`` suffix by condition and replicate, and the others of ``folder``.
+
+    Raises MeasurementError for two files of one replicate.
+    """
     found: dict[str, dict[int, Path]] = {name: {} for name in conditions}
     strangers = []
-    for path in sorted((folder / "scans").glob("*")):
+    for path in sorted(folder.glob("*")):
         name, _, replicate = path.stem.rpartition("_")
-        known = path.suffix.lower() in SUFFIXES
-        if known and name in found and replicate.isdecimal() and int(replicate) >= 1:
+        if known(path.suffix) and name in found and replicate.isdecimal() and int(replicate) >= 1:
             if int(replicate) in found[name]:
-                raise MeasurementError(f"{path}: replicate {replicate} has more than one scan; allowed: one file")
+                raise MeasurementError(f"{path}: replicate {int(replicate)} has more than one scan; allowed: one file")
             found[name][int(replicate)] = path
         else:
             strangers.append(path)
