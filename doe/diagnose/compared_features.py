@@ -40,7 +40,7 @@ class MeasuredFeatures:
     """Features that a condition's data offer: names, replicates (r, d) and the stated error of each feature, (d,).
 
     ``scalars``: number of features that are not read off a surface. ``sight``: what the scans were seen through;
-    ``axis_error``: error of their axis [m].
+    ``axis``, ``axis_error``: place of the rig's axis in their coordinates, and its error [m].
     """
 
     condition: str
@@ -50,6 +50,7 @@ class MeasuredFeatures:
     instrument: FloatArray
     mean_of: int = 1
     scalars: int = 0
+    axis: tuple[float, float] | None = None
     axis_error: float = 0.0
     sight: Sight = PERFECT
 
@@ -74,6 +75,7 @@ def measured(condition: Condition, offer: str | None = None) -> MeasuredFeatures
         instrument=stated,
         mean_of=condition.mean_of,
         scalars=len(names.scalars),
+        axis=next((one.axis for one in condition.surfaces.values()), None),
         axis_error=max((one.axis_error for one in condition.surfaces.values()), default=0.0),
         sight=sight_of(condition) if found == SCAN else PERFECT,
     )
@@ -232,11 +234,8 @@ def _varies(lessons: Lessons, c: int) -> npt.NDArray[np.bool_]:
     own = lessons.where(lessons.own)
     block, groups = own.blocks[c], own.groups()
     size = np.abs(block).max(axis=0, initial=0.0)
-    varies = np.zeros(block.shape[1], dtype=bool)
-    for group in np.unique(groups):
-        some = block[groups == group]
-        varies |= np.ptp(some, axis=0) > CONSTANT * size
-    return varies
+    spans = np.array([np.ptp(block[groups == group], axis=0) for group in np.unique(groups)])
+    return np.asarray((spans > CONSTANT * size).any(axis=0))
 
 
 def _loadings(
@@ -248,10 +247,11 @@ def _loadings(
 ) -> FloatArray:
     """I: response of z to the errors of instruments, which averaging does not reduce, (D, q).
 
-    Stated errors of numbers are independent. The error of a scan's axis, and that of the bias of its sight, move all
-    features read off the surface together.
+    Stated errors of numbers are independent. The error of an axis, and that of the bias of a sight, move all features
+    read off a surface together: in all conditions whose scans state the same axis, by a scanner that stayed in place.
     """
     size, first, found = len(emulator.whitening), 0, []
+    common: dict[tuple[object, ...], FloatArray] = {}
     for c, (squash, block, one, chosen) in enumerate(zip(emulator.squashes, blocks, conditions, columns, strict=True)):
         slope = squash.slope(block.mean(axis=0))
         places = np.arange(first, first + len(chosen))
@@ -259,10 +259,7 @@ def _loadings(
         stated = one.instrument[chosen] * slope
         for k in np.flatnonzero(stated > 0.0):
             found.append(stated[k] * np.eye(size)[places[k]])
-        if instruments:
-            changes = [*instruments[c].axis, BIAS_ERROR * instruments[c].bias]
-            for change in (change[chosen] for change in changes if change.any()):
-                moved = np.zeros(size)
-                moved[places] = change * slope
-                found.append(moved)
+        for of, change in enumerate([*instruments[c].axis, BIAS_ERROR * instruments[c].bias] if instruments else []):
+            common.setdefault((of, one.axis), np.zeros(size))[places] = change[chosen] * slope
+    found += [moved for moved in common.values() if moved.any()]
     return np.asarray(emulator.whitening @ np.array(found).T, dtype=np.float64) if found else np.zeros((size, 0))

@@ -4,7 +4,7 @@ Features are whitened, z = W y with W Σ Wᵀ = I for the covariance Σ of one p
 the signatures. There, for a pour with parameters θ [standard deviations of their measurements] and effect e at a times
 its reference amplitude, each feature is
 
-    z = b + J θ + Q (θ² − 1) + β_e a + γ_e (a² − a) + ε,    ε ~ N(0, 1 + x_e a)
+    z = b + J θ + Q (θ² − 1) + β_e a + γ_e (a² − a) + ε,    ε ~ N(0, n (1 + x_e a))
     b, J flat,    Q ~ N(0, BEND² J²),    β_e ~ N(0, v),    γ_e ~ N(0, CURVATURE² v)
 
 b is the base model, J the linear response to the parameters and Q its departure from linearity; β_e is the signature of
@@ -14,8 +14,10 @@ every pour, the base model is known better through features that the effects do 
 share appear in both. The prior variance v of a signature is learned from all signatures, one variance along each
 principal axis: effects of a granular pour move its features along few directions, and along the others a handful of
 pours shows mostly scatter (empirical Bayes; Efron & Morris 1973, doi 10.1080/01621459.1973.10481350). Of an eigenvalue
-of the signatures' scatter, only the excess over the largest that noise alone produces counts, n (1 + √(D/m))² for m
-signatures of noise n in D features (Marchenko & Pastur 1967, doi 10.1070/SM1967v001n04ABEH001994).
+of the signatures' scatter, only the excess over the largest that noise alone produces counts, ν (1 + √(D/m))² for m
+signatures of noise ν in D features (Marchenko & Pastur 1967, doi 10.1070/SM1967v001n04ABEH001994); what else they
+vary by is spread evenly over all axes. A condition with more measured pours than the others has more weight in z, and
+its pours more variance: that of a pour along an axis is n = Σ w_i A_i² for weights w and axis A.
 
 Before all this each feature x of a pour becomes  s asinh((x − x̄)/(s σ)),  s = ``SQUASH``, because counts and masses
 that are zero in most pours of the base model reach hundreds of its variances under an effect.
@@ -47,8 +49,6 @@ BEND = 0.25
 frictions."""
 SQUASH = 2.0
 """Deviation [standard deviations of a pour] up to which a feature counts in full."""
-FLOOR = 0.3
-"""Fraction of the signatures' variance off the leading axes, where noise hides it, that the prior retains."""
 LEAST_VARIANCE = 1e-3
 """Least variance of a signature along an axis, for estimates near zero."""
 SCALES = np.geomspace(0.003, 3.0, 31)
@@ -59,6 +59,8 @@ SCATTERS = (0.5, 4.0)
 """Range of the ratio of a pour's variance under an effect to that of a base-model pour."""
 FLAT = 1e-9
 """Prior precision of coefficients with a flat prior."""
+FAR = 2.0
+"""Distance of a parameter from its mean [standard deviations] beyond which a pour shares no mean with nearer ones."""
 ANGLES = (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)
 """Directions [rad] in the plane in which an effect with two amplitudes is poured."""
 
@@ -132,9 +134,9 @@ class Lessons:
         return Lessons(self.theta[rows], self.way[rows], self.amplitude[rows], self.own[rows], blocks)
 
     def groups(self) -> npt.NDArray[np.int64]:
-        """Index of each pour's group, (n,); a group is all pours of one way at one amplitude."""
-        pairs = np.column_stack([self.way, self.amplitude])
-        return np.asarray(np.unique(pairs, axis=0, return_inverse=True)[1].reshape(-1), dtype=np.int64)
+        """Index of each pour's group, (n,): pours of one way at one amplitude, with the same parameters far off."""
+        keys = np.column_stack([self.way, self.amplitude, np.sign(self.theta) * (np.abs(self.theta) > FAR)])
+        return np.asarray(np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1), dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -168,6 +170,8 @@ class Emulator:
         Of the c coefficients (b, J, β_1 … β_m, γ_1 … γ_m, Q) of every feature: (D, c = 1 + 2k + 2m) and (D, c, c).
     information
         Xᵀ X of the training pours, (c, c).
+    pour
+        Variance of a base-model pour in every feature, (D,); 1 if all conditions have the same weight.
     freedom
         Degrees of freedom of Σ.
     squashes, whitening
@@ -183,6 +187,7 @@ class Emulator:
     mean: FloatArray
     covariance: FloatArray
     information: FloatArray
+    pour: FloatArray
     freedom: int
     squashes: tuple[Squash, ...]
     whitening: FloatArray
@@ -258,24 +263,19 @@ class Emulator:
 
     def scatter(self, rows: FloatArray) -> FloatArray:
         """Covariance (n, n) of the means for ``rows`` over repeated sets of as many training pours, summed over z."""
-        gained = rows @ self.covariance
+        gained = rows @ self.covariance / np.sqrt(self.pour)[:, None, None]
         return np.einsum("dni,ij,dmj->nm", gained, self.information, gained, optimize=True)
 
     def noise(self, rows: FloatArray) -> FloatArray:
-        """Variance of a pour, (n,), for ``rows`` of the regression; 1 for the base model."""
+        """Variance of a pour over that of the base model's, (n,), for ``rows`` of the regression."""
         return noise_of(rows[:, 1 + self.parameters : 1 + self.parameters + len(self.ways)], self.excess)
 
 
 def planar_weights(angle: float) -> dict[float, float]:
     """Weights of the directions ``ANGLES`` for an effect that acts towards ``angle`` [rad]."""
     c, s, second = math.cos(angle), math.sin(angle), 0.25 * math.cos(2.0 * angle)
-    return dict(
-        zip(
-            ANGLES,
-            (0.25 + 0.5 * c + second, 0.25 + 0.5 * s - second, 0.25 - 0.5 * c + second, 0.25 - 0.5 * s - second),
-            strict=True,
-        )
-    )
+    weights = (0.25 + 0.5 * c + second, 0.25 + 0.5 * s - second, 0.25 - 0.5 * c + second, 0.25 - 0.5 * s - second)
+    return dict(zip(ANGLES, weights, strict=True))
 
 
 def emulated(
@@ -313,18 +313,23 @@ def emulated(
     base, own = lessons.way == -1, lessons.where(lessons.own)
     squashes = tuple(_squash(own, c) for c in range(len(lessons.blocks)))
     drawn_in = [squash(block) for squash, block in zip(squashes, lessons.blocks, strict=True)]
-    whitening, freedom = _whitening([block[lessons.own] for block in drawn_in], own, weights)
+    whitening, freedom = _whitening([block[lessons.own] for block in drawn_in], own)
+    # Only the mean over the pours of a condition gets unit covariance (over their mean number) by its weight.
+    unturned = np.repeat(weights or [1.0] * len(drawn_in), [block.shape[1] for block in drawn_in])
+    whitening = np.sqrt(unturned)[:, None] * whitening
     z = np.concatenate(drawn_in, axis=1) @ whitening.T
     slopes = pooled_slopes(z, lessons.groups(), lessons.theta)
+    near = base & (np.abs(lessons.theta) <= FAR).all(axis=1)
     shift = z - lessons.theta @ slopes
-    shift -= shift[base].mean(axis=0)
+    shift -= shift[near].mean(axis=0)
     # β_e by least squares through the origin, way by way, and the variance of its noise.
     square = np.array([(lessons.amplitude[lessons.way == w] ** 2).sum() for w in range(m)])
-    signatures = np.stack([lessons.amplitude[lessons.way == w] @ shift[lessons.way == w] for w in range(m)] or [z[0]])
-    noise = 1.0 / square + 1.0 / base.sum() if m else np.ones(1)
-    signatures = signatures / square[:, None] if m else 0.0 * signatures
-    variances, axes = signature_prior(signatures, noise)
-    scales = signature_scales(signatures @ axes, noise, variances) if m else np.zeros(0)
+    told = [lessons.amplitude[lessons.way == w] @ shift[lessons.way == w] / square[w] for w in range(m)]
+    signatures = np.stack(told or [0.0 * z[0]])
+    noise = 1.0 / square + 1.0 / near.sum() if m else np.ones(1)
+    variances, axes = signature_prior(signatures, noise * unturned.mean())
+    pour = unturned @ axes**2
+    scales = signature_scales(signatures @ axes, noise[:, None] * pour, variances) if m else np.zeros(0)
     if not shrunk:
         variances, scales = np.full_like(variances, variances.sum()), np.ones(m)
     rows = np.zeros((len(lessons), 1 + 2 * k + 2 * m))
@@ -336,10 +341,10 @@ def emulated(
     excess = _excess(z, lessons, m)
     spread = np.sqrt(noise_of(rows[:, 1 + k : 1 + k + m], excess))[:, None]
     rows = rows / spread
-    mean, covariance = regression(rows, z @ axes / spread, (slopes**2).mean(axis=1), variances, scales)
+    mean, covariance = regression(rows, z @ axes / spread, (slopes**2).mean(axis=1), variances, scales, pour)
     reached = tuple(float(lessons.amplitude[lessons.way == w].max()) for w in range(m))
     turned = axes.T @ whitening
-    return Emulator(tuple(ways), k, mean, covariance, rows.T @ rows, freedom, squashes, turned, reached, excess)
+    return Emulator(tuple(ways), k, mean, covariance, rows.T @ rows, pour, freedom, squashes, turned, reached, excess)
 
 
 def noise_of(amplitudes: FloatArray, excess: FloatArray) -> FloatArray:
@@ -354,11 +359,8 @@ def _excess(z: FloatArray, lessons: Lessons, ways: int) -> FloatArray:
     square = (residuals_within(z, group, lessons.theta) ** 2).mean(axis=1)
     way, amplitude = lessons.way[several], lessons.amplitude[several]
     more = square / square[way == -1].mean() - 1.0
-    found = np.zeros(ways)
-    for number in range(ways):
-        a = amplitude[way == number]
-        found[number] = float(a @ more[way == number]) / (float(a @ a) + FEW_POURS)
-    return found
+    by_way = [(amplitude[way == number], more[way == number]) for number in range(ways)]
+    return np.array([float(a @ some) / (float(a @ a) + FEW_POURS) for a, some in by_way])
 
 
 def signature_prior(signatures: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -371,24 +373,25 @@ def signature_prior(signatures: FloatArray, noise: FloatArray) -> tuple[FloatArr
     values, axes = np.linalg.eigh(signatures.T @ signatures / m)
     leading = np.maximum(values - level * (1.0 + np.sqrt(size / m)) ** 2, 0.0)
     rest = max(LEAST_VARIANCE, (float(values.sum()) - size * level - float(leading.sum())) / size)
-    return leading + FLOOR * rest, axes
+    return leading + rest, axes
 
 
 def signature_scales(signatures: FloatArray, noise: FloatArray, variances: FloatArray) -> FloatArray:
     """s (m,): size of each of ``signatures`` (m, D), along the axes of ``variances`` (D,), relative to the others.
 
+    ``noise``: variance of the noise in each of them, (m, D).
     Maximizes the likelihood of β̂ ~ N(0, s v + noise). Without s, an effect that does hardly anything at the end of its
     range, such as twisting friction under a pile of small bodies, would keep the freedom of a strong effect and, by the
     noise of its own pours, agree with data of the base model better than the base model does.
     """
     square = signatures[:, None] ** 2
-    total = SCALES[None, :, None] * variances + noise[:, None, None]
+    total = SCALES[None, :, None] * variances + noise[:, None]
     likelihood = -0.5 * (np.log(total) + square / total).sum(axis=2)
     return np.asarray(SCALES[likelihood.argmax(axis=1)], dtype=np.float64)
 
 
 def regression(
-    rows: FloatArray, z: FloatArray, slopes: FloatArray, variances: FloatArray, scales: FloatArray
+    rows: FloatArray, z: FloatArray, slopes: FloatArray, variances: FloatArray, scales: FloatArray, pour: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Posterior mean (D, c) and covariance (D, c, c) of the c = 1 + 2k + 2m coefficients of every feature.
 
@@ -400,6 +403,8 @@ def regression(
         Mean square of J over the features, (k,).
     variances, scales
         v (D,) and s (m,).
+    pour
+        Variance of a pour in every feature, (D,).
     """
     columns, m, first = rows.shape[1], len(scales), 1 + len(slopes)
     precision = np.full((len(variances), columns), FLAT)
@@ -407,8 +412,8 @@ def regression(
     precision[:, first : first + m] = own
     precision[:, first + m : first + 2 * m] = own / CURVATURE**2
     precision[:, first + 2 * m :] = 1.0 / (BEND**2 * np.maximum(slopes, LEAST_VARIANCE))
-    covariance = np.linalg.inv(rows.T @ rows + precision[:, :, None] * np.eye(columns))
-    mean = np.einsum("dij,jd->di", covariance, rows.T @ z, optimize=True)
+    covariance = np.linalg.inv((rows.T @ rows) / pour[:, None, None] + precision[:, :, None] * np.eye(columns))
+    mean = np.einsum("dij,jd->di", covariance, rows.T @ z / pour, optimize=True)
     return np.asarray(mean, dtype=np.float64), np.asarray(covariance, dtype=np.float64)
 
 
@@ -419,12 +424,10 @@ def _squash(own: Lessons, condition: int) -> Squash:
     return Squash(block[own.way == -1].mean(axis=0), np.where(deviation > 0.0, deviation, 1.0))
 
 
-def _whitening(drawn_in: Sequence[FloatArray], own: Lessons, weights: Sequence[float] | None) -> tuple[FloatArray, int]:
+def _whitening(drawn_in: Sequence[FloatArray], own: Lessons) -> tuple[FloatArray, int]:
     """W (D, D), block-diagonal by condition, and the degrees of freedom of Σ."""
     group = own.groups()
     covariances = [shrunk_covariance(residuals_within(block, group, own.theta)) for block in drawn_in]
     white = block_diag(*(np.linalg.inv(np.linalg.cholesky(one)) for one in covariances))
-    if weights:
-        white *= np.sqrt(np.repeat(weights, [len(one) for one in covariances]))[:, None]
     several = np.bincount(group) > 1
     return white, max(1, int(several[group].sum()) - int(several.sum()) - own.theta.shape[1])

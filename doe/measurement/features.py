@@ -98,7 +98,7 @@ def feature_set(condition: Condition) -> FeatureSet:
     surface: tuple[str, ...] = BULK_NAMES
     if resolution(condition) <= FINE * 2.0 * smallest_radius(condition.scene):
         surface += HISTOGRAM_NAMES + TEXTURE_NAMES
-    if all(one.on_axis for one in condition.surfaces.values()):
+    if all(one.axis is not None for one in condition.surfaces.values()):
         surface += ASYMMETRY_NAMES
     # The name states how a number is read, so that a store never confuses two ways of reading it.
     cell, times = cells_of(condition)

@@ -39,7 +39,7 @@ class PileSurface:
 
     spheres: Spheres
     grid: float = 0.0
-    on_axis: bool = True
+    axis: tuple[float, float] | None = (0.0, 0.0)
     axis_error: float = 0.0
     noise: float = 0.0
 

@@ -81,8 +81,8 @@ class UpperSurface(Protocol):
         """Resolution [m]; 0 where it is unlimited."""
 
     @property
-    def on_axis(self) -> bool:
-        """Whether the rig's axis is known."""
+    def axis(self) -> tuple[float, float] | None:
+        """Where the rig's axis is said to be in the scanner's coordinates [m]; None if it is not known."""
 
     @property
     def axis_error(self) -> float:
@@ -104,8 +104,9 @@ class Scan:
     """(n, 3)"""
     grid: float
     """Resolution [m]: spacing of the points."""
-    on_axis: bool
-    """Whether the axis is known; otherwise x and y are relative to the centre of the volume."""
+    axis: tuple[float, float] | None
+    """Where the axis is said to be in the file's coordinates [m]; if None, x and y are relative to the centre of the
+    volume."""
     axis_error: float = AXIS_ERROR
     """Standard deviation of each coordinate of the axis [m]."""
     noise: float = 0.0
@@ -178,7 +179,7 @@ def read_scan(path: Path, settings: ScanSettings) -> Scan:
         raise MeasurementError(f"{path}: {error}") from None
     except (OSError, ParameterError) as error:
         raise MeasurementError(f"{path}: cannot be read ({' '.join(str(error).split())[:120]})") from None
-    return Scan(points, grid, settings.axis is not None, settings.axis_error, settings.noise or 0.0)
+    return Scan(points, grid, settings.axis, settings.axis_error, settings.noise or 0.0)
 
 
 def found_plate(points: Array) -> tuple[float, float, float]:

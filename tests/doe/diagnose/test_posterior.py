@@ -63,7 +63,7 @@ def emulator(shifts, freedom=200, pours=12, sensitivity=None, variance=25.0, way
         z += [shift] * pours
     table = np.array(rows)
     table[:, 0] = 1.0
-    mean, covariance = regression(table, np.array(z), np.zeros(1), np.full(SIZE, variance), np.ones(m))
+    mean, covariance = regression(table, np.array(z), np.zeros(1), np.full(SIZE, variance), np.ones(m), np.ones(SIZE))
     covariance[:, -1, -1] = 0.0  # the parameter's answer is known to be straight
     names = ways or tuple(Way(name, name) for name in shifts)
     return Emulator(
@@ -72,6 +72,7 @@ def emulator(shifts, freedom=200, pours=12, sensitivity=None, variance=25.0, way
         mean,
         covariance,
         table.T @ table,
+        np.ones(SIZE),
         freedom,
         (UNSQUASHED,) * 2,
         np.eye(SIZE),
@@ -107,13 +108,15 @@ def test_what_predictions_vary_by_is_what_the_noise_of_each_pour_does_to_them():
     rng = np.random.default_rng(5)
     theta, a = rng.standard_normal(9), np.repeat([0.0, 1.0, 2.0], 3)
     table = np.column_stack([np.ones(9), theta, a, a**2 - a, theta**2 - 1.0])
-    z, prior = rng.standard_normal((9, SIZE)), (np.full(1, 0.5), np.linspace(0.1, 9.0, SIZE), np.ones(1))
+    pour = np.geomspace(0.25, 4.0, SIZE)
+    z, prior = rng.standard_normal((9, SIZE)), (np.full(1, 0.5), np.linspace(0.1, 9.0, SIZE), np.ones(1), pour)
     mean, covariance = regression(table, z, *prior)
-    found = replace(emulator({"push": np.zeros(SIZE)}), mean=mean, covariance=covariance, information=table.T @ table)
+    taught = emulator({"push": np.zeros(SIZE)})
+    found = replace(taught, mean=mean, covariance=covariance, information=table.T @ table, pour=pour)
     asked = np.array([[1.0, 0.5, 1.5, 0.75, -0.75], [1.0, -1.0, 0.0, 0.0, 0.0]])
     expected = np.zeros((2, 2))
-    for pour in range(9):
-        noisy = z + np.eye(9)[pour][:, None]
+    for number in range(9):
+        noisy = z + np.eye(9)[number][:, None] * np.sqrt(pour)
         moved = asked @ (regression(table, noisy, *prior)[0] - mean).T
         expected += moved @ moved.T
     assert found.scatter(asked) == pytest.approx(expected)
@@ -563,7 +566,7 @@ def test_a_feature_that_hardly_ever_varies_does_not_spoil_the_answer():
 
 def test_a_signature_that_is_only_noise_is_believed_to_be_small():
     rng = np.random.default_rng(4)
-    variances, noise = np.geomspace(10.0, 0.1, 40), np.full(12, 0.1)
+    variances, noise = np.geomspace(10.0, 0.1, 40), np.full((12, 40), 0.1)
     signatures = rng.normal(size=(12, 40)) * np.sqrt(variances + 0.1)
     signatures[0] = rng.normal(size=40) * np.sqrt(0.1)
     scales = signature_scales(signatures, noise, variances)

@@ -39,15 +39,15 @@ def pour():
     return unpacked((RAW_POURS / "trefoils.npz").read_bytes())
 
 
-def scanned(condition, spheres, grid, noise=0.0, on_axis=True):
+def scanned(condition, spheres, grid, noise=0.0, axis=(0.0, 0.0)):
     """The condition with one replicate, its pile scanned at ``grid`` [m] with ``noise`` [m]."""
     seen = PileSurface(spheres).height_map(frame_of_scene(condition.scene).half_width, grid)
     n = seen.height.shape[0]
-    axis = (np.arange(n) + 0.5 - n / 2) * grid
-    x, y = np.meshgrid(axis, axis, indexing="ij")
+    places = (np.arange(n) + 0.5 - n / 2) * grid
+    x, y = np.meshgrid(places, places, indexing="ij")
     z = seen.height + noise * np.random.default_rng(0).standard_normal(seen.height.shape)
     points = np.stack([x, y, z], axis=-1).reshape(-1, 3)
-    return dataclasses.replace(condition, replicates=1, surfaces={1: Scan(points, grid, on_axis)}, observations=())
+    return dataclasses.replace(condition, replicates=1, surfaces={1: Scan(points, grid, axis)}, observations=())
 
 
 def plain(condition):
@@ -122,7 +122,7 @@ def test_a_pixel_is_as_many_cells_as_fit_into_a_quarter_of_a_body(trefoil, pour,
 
 
 def test_a_scan_without_an_axis_says_nothing_of_where_the_pile_leans(trefoil, pour):
-    names = plain(scanned(trefoil, pour.pile.spheres, 1e-3, on_axis=False))
+    names = plain(scanned(trefoil, pour.pile.spheres, 1e-3, axis=None))
     assert "ring_volume_m3" in names
     assert not [name for name in names if "skew" in name]
 

@@ -109,7 +109,7 @@ def test_shadows_are_filled_with_what_stands_at_their_distance(tmp_path):
 def test_without_an_axis_the_centre_of_the_volume_stands_for_it(tmp_path):
     write(tmp_path / "scan.xyz", points(), 1.0)
     scan = read_scan(tmp_path / "scan.xyz", ScanSettings())
-    assert not scan.on_axis
+    assert scan.axis is None
     _, x, y = volume_and_skew(scan)
     assert max(abs(x), abs(y)) < 0.2e-3
 

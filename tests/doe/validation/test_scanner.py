@@ -65,7 +65,7 @@ def test_its_file_is_read_like_anybodys_and_its_axis_is_off(tmp_path):
     write_scan(tmp_path / "low_1.npz", used.scan(*BALL, np.random.default_rng(1)))
     settings = checked(ScanSettings, used.table(), "scan")
     scan = read_scan(tmp_path / "low_1.npz", settings)
-    assert scan.on_axis
+    assert scan.axis is not None
     assert scan.grid == pytest.approx(1e-3)
     # The summit of the ball, displaced by what the laboratory takes for its axis; nodes are 1 mm apart.
     top = scan.points[scan.points[:, 2].argmax()]
