@@ -6,7 +6,8 @@ the measured numbers
     y = y₀ + Σ_e s_e(a_e) + ε,    ε ~ N(0, 1 + K Kᵀ)
 
 y₀ and the shifts s_e follow from the declared scene, by geometry or by simulated plate tests, without any pour. K holds
-the changes per standard deviation of each calibrated parameter; what the piles say of the parameters is not used here.
+the changes per standard deviation of each calibrated parameter. Piles are weighed with what the numbers say of the
+parameters (``parameters``), so a parameter that is off counts once.
 An apparent friction μ (1 + F/(m g)) grows with the adhesive load F on a contact, and the loads of two effects add up,
 but only approximately: simplified JKR adhesion grows with the load itself, and a body may be heavier (``TOGETHER``).
 """
@@ -50,13 +51,14 @@ FINE = 9
 class BodyEvidence:
     """The measured numbers ``rows``, and their differences ``off`` from those of the declared ``scene``.
 
-    ``factor``: Cholesky factor (q, q) of the covariance 1 + K Kᵀ. ``off``: (q,), whitened by it. ``effects``: the
-    candidates.
+    ``slopes``: K (q, k). ``factor``: Cholesky factor (q, q) of the covariance 1 + K Kᵀ. ``off``: (q,), whitened by it.
+    ``effects``: the candidates.
     """
 
     scene: Scene
     rows: tuple[MeasuredBody, ...]
     off: FloatArray
+    slopes: FloatArray
     factor: FloatArray
     effects: tuple[CandidateEffect, ...]
     _shifts: dict[str, PchipInterpolator | None] = field(default_factory=dict)
@@ -72,19 +74,20 @@ class BodyEvidence:
         Densities are averaged over a cell about each of ``amplitudes`` (n, p) [natural units], from 1/√``cell`` to
         √``cell`` times the amplitude; the columns are the amplitudes of the effects in turn.
         """
-        steps = cell ** ((np.arange(FINE) + 0.5) / FINE - 0.5)
-        moved, column = [], 0
-        for name in [] if label == "base" else label.split("+"):
-            if self.moved_by(name):
-                moved.append(self.shift(name, np.outer(steps, amplitudes[:, column])))
-            column += len(EFFECTS[name].amplitudes)
-        if len(moved) == 2:
-            moved = [moved[0][:, None], moved[1][None]]
-        shift = self._together(moved, (len(amplitudes), len(self.rows))).reshape(-1, len(amplitudes), len(self.rows))
-        factor = self._factor_of(moved)
-        logs = -0.5 * (_white(factor, self.factor @ self.off - shift) ** 2).sum(axis=2)
+        left, factor = self._left(label, amplitudes, cell ** ((np.arange(FINE) + 0.5) / FINE - 0.5))
+        logs = -0.5 * (_white(factor, left) ** 2).sum(axis=2)
         logs -= np.log(np.diag(factor) / np.diag(self.factor)).sum()
         return np.asarray(np.logaddexp.reduce(logs, axis=0) - np.log(len(logs)))
+
+    def parameters(self, label: str, amplitudes: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Means (n, k) and covariance (k, k) of the parameters [standard deviations], given the numbers.
+
+        For N(0, 1) before, θ | y ~ N(C Kᵀ N⁻¹ (y − y₀ − s), C) with C⁻¹ = 1 + Kᵀ N⁻¹ K and the covariance N of ε.
+        """
+        left, factor = self._left(label, amplitudes, np.ones(1))
+        gained = np.linalg.solve(factor @ factor.T - self.slopes @ self.slopes.T, self.slopes)
+        covariance = np.linalg.inv(np.eye(self.slopes.shape[1]) + self.slopes.T @ gained)
+        return np.asarray(left[0] @ gained @ covariance), np.asarray(covariance)
 
     def moved_by(self, name: str) -> bool:
         """Whether the effect ``name`` moves any of the numbers."""
@@ -96,18 +99,21 @@ class BodyEvidence:
             return np.zeros((*amplitudes.shape, len(self.rows)))
         return np.asarray(known(np.clip(amplitudes, known.x[0], known.x[-1])))
 
-    def predicted(self, acting: Acting) -> tuple[FloatArray, FloatArray]:
-        """Mean (q,) and covariance (q, q) of the whitened numbers with effects ``acting``."""
+    def predicted(self, acting: Acting, theta: FloatArray, unsure: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Mean (q,) and covariance (q, q) of the whitened numbers with effects ``acting``.
+
+        ``theta``, ``unsure``: parameters [standard deviations] under this model, (k,), and their covariance, (k, k).
+        """
         moved = [one for one in acting if self.moved_by(one[0])]
         still = [self.shift(name, np.array(amplitude)) for name, amplitude, _ in moved]
         mean = self._together(still, (len(self.rows),))
         factor = self._factor_of(still)
-        covariance = factor @ factor.T
+        covariance = factor @ factor.T + self.slopes @ (unsure - np.eye(len(theta))) @ self.slopes.T
         for k, (name, amplitude, deviation) in enumerate(moved):
             beside = [*still[:k], self.shift(name, np.array(amplitude + deviation)), *still[k + 1 :]]
             more = self._together(beside, mean.shape) - mean
             covariance += np.outer(more, more)
-        return _white(self.factor, mean), _white(self.factor, _white(self.factor, covariance).T)
+        return _white(self.factor, mean + self.slopes @ theta), _white(self.factor, _white(self.factor, covariance).T)
 
     def told_apart(self, answers: Sequence[Acting]) -> npt.NDArray[np.bool_]:
         """Whether ``answers`` may differ by more than a standard deviation, parameters included, in each number (q,).
@@ -122,6 +128,20 @@ class BodyEvidence:
         ]
         means = [self._together(some, (len(self.rows),)) for some in shifts]
         return np.asarray(np.ptp(means, axis=0) > np.linalg.norm(self.factor, axis=1))
+
+    def _left(self, label: str, amplitudes: FloatArray, steps: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The numbers less their shift by ``label`` at ``steps`` of ``amplitudes``, (s or s², n, q), and the Cholesky
+        factor (q, q) of their covariance.
+        """
+        moved, column = [], 0
+        for name in [] if label == "base" else label.split("+"):
+            if self.moved_by(name):
+                moved.append(self.shift(name, np.outer(steps, amplitudes[:, column])))
+            column += len(EFFECTS[name].amplitudes)
+        if len(moved) == 2:
+            moved = [moved[0][:, None], moved[1][None]]
+        shift = self._together(moved, (len(amplitudes), len(self.rows))).reshape(-1, len(amplitudes), len(self.rows))
+        return self.factor @ self.off - shift, self._factor_of(moved)
 
     def _together(self, shifts: Sequence[FloatArray], shape: tuple[int, ...]) -> FloatArray:
         """Shift of the numbers by effects that act together; ``shape``: shape of the result without effects."""
@@ -224,7 +244,7 @@ def _evidence(measurement: Measurement, declared: Declared, rows: Sequence[Measu
     slopes = 0.5 * (both[:, 1] - both[:, 0]).T
     factor = np.linalg.cholesky(np.eye(len(rows)) + slopes @ slopes.T)
     off = (np.array([one.value for one in rows]) - still) / errors
-    return BodyEvidence(scene, tuple(rows), solve_triangular(factor, off, lower=True), factor, declared.effects)
+    return BodyEvidence(scene, tuple(rows), solve_triangular(factor, off, lower=True), slopes, factor, declared.effects)
 
 
 @dataclass(frozen=True)

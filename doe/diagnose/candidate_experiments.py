@@ -121,7 +121,7 @@ def checked_by_bodies(
     acts = {label: acting_in(found, label) for label in weights}
     if (bodies := wanted_bodies(measurement, declared, list(acts.values()))) is None:
         return ()
-    predictions = {label: Prediction(*bodies.predicted(acts[label])) for label in weights}
+    predictions = {label: _of_bodies(bodies, found, label) for label in weights}
     # Nothing is poured: all noise is in the predictions.
     (ranked,) = rank_experiments([CandidateExperiment(BODIES_ALONE, predictions)], weights, math.inf)
     return (Suggestion(ranked, {}, measurement.fit[0].name, tuple(weights), (), 0, bodies=bodies.asked),)
@@ -197,9 +197,15 @@ def _with_bodies(item: CandidateExperiment, found: Posterior, bodies: BodyEviden
     """``item`` with predictions of the single-body numbers; adding a pour's noise to them is slightly too much."""
     predictions = {}
     for label, one in item.predictions.items():
-        mean, covariance = bodies.predicted(acting_in(found, label))
-        predictions[label] = Prediction(np.append(one.mean, mean), block_diag(one.covariance, covariance))
+        more = _of_bodies(bodies, found, label)
+        joined = np.append(one.mean, more.mean), block_diag(one.covariance, more.covariance)
+        predictions[label] = Prediction(*joined)
     return replace(item, predictions=predictions)
+
+
+def _of_bodies(bodies: BodyEvidence, found: Posterior, label: str) -> Prediction:
+    fit = found.fits[label]
+    return Prediction(*bodies.predicted(acting_in(found, label), fit.theta, fit.theta_covariance))
 
 
 def _rows(emulator: Emulator, training: TrainingPours, found: Posterior, label: str) -> FloatArray:

@@ -37,6 +37,7 @@ import numpy.typing as npt
 from scipy.linalg import block_diag
 
 from doe.analysis.covariance import pooled_slopes, residuals_within, shrunk_covariance
+from doe.analysis.squash import SQUASH, Squash, squash_of
 from doe.errors import StatisticsError
 
 FloatArray = npt.NDArray[np.float64]
@@ -47,8 +48,6 @@ CURVATURE = 0.5
 BEND = 0.25
 """The same for a parameter. In the reference pours it is 0.2 for restitution, and too small to be measured for the
 frictions."""
-SQUASH = 2.0
-"""Deviation [standard deviations of a pour] up to which a feature counts in full."""
 LEAST_VARIANCE = 1e-3
 """Least variance of a signature along an axis, for estimates near zero."""
 SCALES = np.geomspace(0.003, 3.0, 31)
@@ -137,23 +136,6 @@ class Lessons:
         """Index of each pour's group, (n,): pours of one way at one amplitude, with the same parameters far off."""
         keys = np.column_stack([self.way, self.amplitude, np.sign(self.theta) * (np.abs(self.theta) > FAR)])
         return np.asarray(np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1), dtype=np.int64)
-
-
-@dataclass(frozen=True)
-class Squash:
-    """Compresses the tails of a condition's features, which have this centre and standard deviation, (d_c,)."""
-
-    centre: FloatArray
-    deviation: FloatArray
-
-    def __call__(self, pours: FloatArray) -> FloatArray:
-        """Features of ``pours``, (n, d_c), with their tails compressed."""
-        return np.asarray(SQUASH * np.arcsinh((pours - self.centre) / (SQUASH * self.deviation)), dtype=np.float64)
-
-    def slope(self, pours: FloatArray) -> FloatArray:
-        """Derivative of the compressed features at ``pours``."""
-        x = (pours - self.centre) / (SQUASH * self.deviation)
-        return np.asarray(1.0 / (self.deviation * np.sqrt(1.0 + x**2)), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -311,7 +293,8 @@ def emulated(
             raise StatisticsError(f"{name}: {count} pours valid in every condition; allowed: at least 2")
     k, m = lessons.theta.shape[1], len(ways)
     base, own = lessons.way == -1, lessons.where(lessons.own)
-    squashes = tuple(_squash(own, c) for c in range(len(lessons.blocks)))
+    still = (own.way == -1) & (np.abs(own.theta) <= FAR).all(axis=1)
+    squashes = tuple(squash_of(block, own.groups(), own.theta, still) for block in own.blocks)
     drawn_in = [squash(block) for squash, block in zip(squashes, lessons.blocks, strict=True)]
     whitening, freedom = _whitening([block[lessons.own] for block in drawn_in], own)
     # Only the mean over the pours of a condition gets unit covariance (over their mean number) by its weight.
@@ -415,13 +398,6 @@ def regression(
     covariance = np.linalg.inv((rows.T @ rows) / pour[:, None, None] + precision[:, :, None] * np.eye(columns))
     mean = np.einsum("dij,jd->di", covariance, rows.T @ z / pour, optimize=True)
     return np.asarray(mean, dtype=np.float64), np.asarray(covariance, dtype=np.float64)
-
-
-def _squash(own: Lessons, condition: int) -> Squash:
-    """Centre from the mean of the base model's pours, deviation from the residuals within all groups."""
-    block = own.blocks[condition]
-    deviation = np.sqrt((residuals_within(block, own.groups(), own.theta) ** 2).mean(axis=0))
-    return Squash(block[own.way == -1].mean(axis=0), np.where(deviation > 0.0, deviation, 1.0))
 
 
 def _whitening(drawn_in: Sequence[FloatArray], own: Lessons) -> tuple[FloatArray, int]:

@@ -3,15 +3,16 @@
 The mean z of n pours per condition, whitened by the covariance Σ of one pour, is compared with the prediction of each
 model by the emulator that they share (``emulator.py``), with mean m(e, a) and variance u(e, a) feature by feature:
 
-    effect e at amplitude a             z ~ t( m(e, a),  diag(u(e, a) + w + r(e, a)/n) + J Jᵀ + I Iᵀ )
-    nothing missing                     z ~ t( m₀,       diag(u₀ + w + r/n) + J Jᵀ + I Iᵀ )
-    something outside the library       z ~ t( m₀,       diag(u₀ + w + r/n + s²) + J Jᵀ + I Iᵀ )
+    effect e at amplitude a             z ~ t( m(e, a),  diag(u(e, a) + w + r(e, a)/n) + J Θ Jᵀ + I Iᵀ )
+    nothing missing                     z ~ t( m₀,       diag(u₀ + w + r/n) + J Θ Jᵀ + I Iᵀ )
+    something outside the library       z ~ t( m₀,       diag(u₀ + w + r/n + s²) + J Θ Jᵀ + I Iᵀ )
 
 Σ is known with ν degrees of freedom, those of all conditions together. With Σ integrated out, the density of D features
 at distance q is (1 + q/ν)^(−(ν+1)/2), a multivariate t with ν − D + 1 degrees of freedom (Geisser and Cornfield 1963,
 J. R. Stat. Soc. B 25:368): the more features are whitened by a Σ from few pours, the less a distance says. J is the
-response to a parameter per standard deviation of its measurement, and w the variance due to the error in J. Parameters
-are integrated out about their best fit under each model, with J the slope there (Laplace), because the response to a
+response to a parameter per standard deviation of its measurement, and w the variance due to the error in J. Θ is 1, or
+what measurements of single bodies leave of the parameters, with m then at the means that they give. Parameters are
+integrated out about their best fit under each model, with J the slope there (Laplace), because the response to a
 parameter is not linear. I holds the stated errors of instruments. r ≥ 1 is the variance of the data's replicates over
 the simulated one, or the variance of pours under the effect if that is larger.
 The evidence of an effect is the mean over its amplitudes (evenly in their logarithm), its signs and its directions in
@@ -109,8 +110,9 @@ class Fit:
     ----------
     amplitudes
         Of its effects, in order.
-    theta, theta_covariance
-        Posterior of the parameters [standard deviations of their measurements], (k,) and (k, k).
+    theta, theta_covariance, prior
+        Posterior of the parameters [standard deviations of their measurements], (k,) and (k, k), and their covariance
+        before the piles are seen, (k, k).
     slopes
         Response to the parameters there, (D, k).
     z, variance
@@ -130,6 +132,7 @@ class Fit:
     amplitudes: tuple[Amplitude, ...]
     theta: FloatArray
     theta_covariance: FloatArray
+    prior: FloatArray
     slopes: FloatArray
     z: FloatArray
     variance: FloatArray
@@ -227,7 +230,9 @@ def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, 
     weigher = _Weigher(emulator, data)
     base = weigher.base
     mean, variance = weigher.at(base.rows)
-    spread = weigher.log_t(np.repeat(mean, len(SPREADS), 0), variance + SPREADS[:, None] ** 2)
+    spread = weigher.log_t(
+        np.repeat(mean, len(SPREADS), 0), variance + SPREADS[:, None] ** 2, *weigher.prior("base", base)
+    )
     singles = {name: _nodes_of(emulator, name) for name in dict.fromkeys(way.effect for way in emulator.ways)}
     logs = {name: weigher.densities(name, nodes) for name, nodes in singles.items()}
     fits = {"base": weigher.fit("base", base, weigher.densities("base", base))}
@@ -386,32 +391,43 @@ class _Weigher:
         means = self._emulator.at(np.concatenate([self.base.rows, rows]))[0]
         return np.asarray(np.sqrt(self._data.replicates) * np.linalg.norm(means[1:] - means[0], axis=1))
 
-    def bent(self, mean: FloatArray, variance: FloatArray) -> tuple[FloatArray, ...]:
-        """Fit the parameters by Gauss–Newton and linearize the prediction there.
+    def bent(
+        self, mean: FloatArray, variance: FloatArray, centre: FloatArray, prior: FloatArray
+    ) -> tuple[FloatArray, ...]:
+        """Fit the parameters, N(``centre``, ``prior``) before, by Gauss–Newton and linearize the prediction there.
 
-        Returns θ (n, k); the data less the linearized prediction at θ = 0, its variance, and the prediction at the fit,
-        (n, D) each; and the slopes there, (n, D, k).
+        Returns θ (n, k); the data less the linearized prediction at ``centre`` (n or 1, k), its variance, and the
+        prediction at the fit, (n, D) each; and the slopes there, (n, D, k).
         """
+        precision = np.linalg.inv(prior)
         theta = np.zeros((len(mean), self._emulator.parameters))
         for _ in range(STEPS):
             moved, unsure, slopes = self._emulator.moved(theta)
-            left = self._data.z - mean - moved + (slopes @ theta[:, :, None])[:, :, 0]
+            left = self._data.z - mean - moved + (slopes @ (theta - centre)[:, :, None])[:, :, 0]
             weighted = (slopes / (variance + unsure)[:, :, None]).swapaxes(1, 2)
-            best = np.linalg.solve(np.eye(theta.shape[1]) + weighted @ slopes, weighted @ left[:, :, None])
-            theta = np.clip(best[:, :, 0], -FARTHEST, FARTHEST)
+            best = np.linalg.solve(precision + weighted @ slopes, weighted @ left[:, :, None])
+            theta = np.clip(centre + best[:, :, 0], -FARTHEST, FARTHEST)
         return theta, left, variance + unsure, mean + moved, slopes
 
-    def log_t(self, mean: FloatArray, variance: FloatArray) -> FloatArray:
+    def prior(self, label: str, nodes: _Nodes) -> tuple[FloatArray, FloatArray]:
+        """Means (n, k) and covariance (k, k) of the parameters before the piles are seen."""
+        bodies, k = self._data.bodies, self._emulator.parameters
+        unknown = np.zeros((len(nodes.rows), k)), np.eye(k)
+        return unknown if bodies is None else bodies.parameters(label, nodes.natural)
+
+    def log_t(self, mean: FloatArray, variance: FloatArray, centre: FloatArray, prior: FloatArray) -> FloatArray:
         """Log densities (n,) of the data for predictions with ``mean`` and ``variance``, (n, D) each."""
-        _, left, variance, _, slopes = self.bent(mean, variance)
+        _, left, variance, _, slopes = self.bent(mean, variance, centre, prior)
+        slopes = slopes @ np.linalg.cholesky(prior)
         instrument = np.broadcast_to(self._data.instrument, (*left.shape, self._data.instrument.shape[1]))
         return log_t(left, variance, np.concatenate([slopes, instrument], axis=2), self._freedom)
 
     def densities(self, label: str, nodes: _Nodes) -> FloatArray:
         """Log densities (n,) of the data under ``nodes``, single bodies included."""
-        starts, rows = range(0, len(nodes.rows), AT_ONCE), nodes.rows
-        parts = [self.log_t(*self.at(rows[first : first + AT_ONCE])) for first in starts]
-        return np.concatenate(parts) + self.of_bodies(label, nodes)
+        centre, prior = self.prior(label, nodes)
+        parts = [slice(first, first + AT_ONCE) for first in range(0, len(nodes.rows), AT_ONCE)]
+        found = [self.log_t(*self.at(nodes.rows[part]), centre[part], prior) for part in parts]
+        return np.concatenate(found) + self.of_bodies(label, nodes)
 
     def of_bodies(self, label: str, nodes: _Nodes) -> FloatArray:
         """Log densities (n,) of the measurements of single bodies, up to a constant."""
@@ -422,9 +438,10 @@ class _Weigher:
         """The model at its best node, with amplitudes and evidence from all nodes."""
         best = int(logs.argmax())
         mean, noise = (one[0] for one in self.at(nodes.rows[best : best + 1]))
-        theta, d, noise, z, slopes = (one[0] for one in self.bent(mean[None], noise[None]))
-        covariance = np.linalg.inv(np.eye(len(theta)) + slopes.T @ (slopes / noise[:, None]))
-        full = np.diag(noise) + slopes @ slopes.T + self._data.instrument @ self._data.instrument.T
+        centre, prior = self.prior(label, replace(nodes, natural=nodes.natural[best : best + 1]))
+        theta, d, noise, z, slopes = (one[0] for one in self.bent(mean[None], noise[None], centre[:1], prior))
+        covariance = np.linalg.inv(np.linalg.inv(prior) + slopes.T @ (slopes / noise[:, None]))
+        full = np.diag(noise) + slopes @ prior @ slopes.T + self._data.instrument @ self._data.instrument.T
         square, numbers = float(d @ np.linalg.solve(full, d)), len(d)
         if self._data.bodies is not None:
             square -= 2.0 * float(self.of_bodies(label, nodes)[best])
@@ -443,6 +460,7 @@ class _Weigher:
             tuple(amplitudes),
             theta,
             covariance,
+            prior,
             slopes,
             z,
             noise,

@@ -266,9 +266,9 @@ def _residuals(compared: Compared, before: Fit, after: Fit) -> tuple[Residual, .
     measured = emulator.features(data.z)
     columns = []
     for fit in (before, after):
-        # The fit follows part of the noise: with θ ~ N(0, I) and N = diag(variance), z − ẑ = (I − J C Jᵀ N⁻¹)(z − m).
+        # The fit follows part of the noise: with θ ~ N(μ, Θ) and N = diag(variance), z − ẑ = (I − J C Jᵀ N⁻¹)(z − m).
         left = np.eye(len(data.z)) - fit.slopes @ fit.theta_covariance @ (fit.slopes / fit.variance[:, None]).T
-        whole = np.diag(fit.variance) + fit.slopes @ fit.slopes.T + data.instrument @ data.instrument.T
+        whole = np.diag(fit.variance) + fit.slopes @ fit.prior @ fit.slopes.T + data.instrument @ data.instrument.T
         spread = left @ whole @ left.T
         sigma = np.sqrt(np.einsum("ij,jk,ik->i", inverse, spread, inverse, optimize=True))
         columns.append((emulator.features(fit.z), inverse @ (data.z - fit.z) / sigma))

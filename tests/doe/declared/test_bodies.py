@@ -114,9 +114,15 @@ def test_loads_of_two_adhesions_add_up_and_a_lower_friction_is_a_factor(data, se
     found = evidence_of(data, MeasuredBody("bead", row, wanted, 0.05 * wanted))
     width = math.hypot(0.05, TOGETHER)
     assert found.log_density(both, amplitudes, 1.0 + 1e-9) == pytest.approx([-math.log(width / 0.05)], abs=0.01)
-    mean, covariance = found.predicted([(name, at[name], 0.0) for name in names])
+    mean, covariance = found.predicted([(name, at[name], 0.0) for name in names], *unknown(found))
     assert mean == pytest.approx(found.off, rel=0.01)
     assert covariance == pytest.approx(np.array([[(width / 0.05) ** 2]]))
+
+
+def unknown(found):
+    """Parameters of which the piles say nothing."""
+    k = found.slopes.shape[1]
+    return np.zeros(k), np.eye(k)
 
 
 def acting(*names, share=0.3):
@@ -154,10 +160,12 @@ def test_what_is_measured_is_not_asked_for_again(data):
 
 def test_a_prediction_knows_how_well_its_amplitude_is_known(data):
     found = wanted_bodies(data, declare(data, NAMES), [[("density_error", 0.1, 0.05)], []])
-    mean, covariance = found.predicted([("density_error", 0.1, 0.05), ("rolling_resistance", 0.1, 0.02)])
+    mean, covariance = found.predicted(
+        [("density_error", 0.1, 0.05), ("rolling_resistance", 0.1, 0.02)], *unknown(found)
+    )
     assert mean == pytest.approx([math.log(1.1) / 0.01], rel=1e-3)
     assert covariance == pytest.approx(np.array([[1.0 + (math.log(1.15 / 1.1) / 0.01) ** 2]]), rel=0.01)
-    assert found.predicted([])[0] == pytest.approx([0.0])
+    assert found.predicted([], *unknown(found))[0] == pytest.approx([0.0])
 
 
 def test_between_amplitudes_that_were_set_up_a_friction_is_known_to_a_fiftieth_of_its_shift(data):
@@ -173,3 +181,25 @@ def test_rows_stand_beside_both_models(data):
     measured = [MeasuredBody("bead", "mass", 1.1 * MASS, 0.011 * MASS)]
     (row,) = body_rows(data.fit[0].scene, measured, {"density_error": [0.1]})
     assert (row.declared, row.final, row.unit) == (pytest.approx(MASS), pytest.approx(1.1 * MASS), "kg")
+
+
+def test_two_frictions_say_what_the_parameter_is_and_piles_what_a_third_will_be(data):
+    """One parameter with slope K = atanh(0.1)/0.05 in both: a mean of two, by hand; and a prediction from the piles."""
+    friction = MeasuredParameter("pair.glass.steel.static_friction", 0.2, 0.4, 0.3, 0.03, "1")
+    names = ("apparent_static_friction", "apparent_kinetic_friction")
+    data = replace(data, parameters=(friction,))
+    found = evidence_of(data, *[MeasuredBody("bead", name, 0.36, 0.018) for name in names])
+    slope, off = math.atanh(0.1) / 0.05, math.log(1.2) / 0.05
+    means, covariance = found.parameters("base", np.zeros((3, 0)))
+    assert covariance == pytest.approx(np.array([[1.0 / (1.0 + 2.0 * slope**2)]]))
+    assert means == pytest.approx(np.full((3, 1), 2.0 * slope * off * covariance[0, 0]))
+    # An effect that explains the numbers leaves the parameter where it was.
+    work = 0.2 * MASS * 9.81 / (3.0 * math.pi * 6e-3)
+    explained, _ = found.parameters("adhesion_jkr", np.array([[work]]))
+    assert abs(explained[0, 0]) < 0.05 * means[0, 0]
+    (other,) = [wanted_bodies(data, declare(data, NAMES), [acting("kinetic_friction"), []])]
+    mean, spread = other.predicted([], np.array([1.5]), np.array([[0.04]]))
+    q = [row.quantity for row in other.rows].index("apparent_kinetic_friction")
+    raw = (other.factor @ mean)[q], (other.factor @ spread @ other.factor.T)[q, q]
+    own = other.slopes[q, 0]
+    assert raw == pytest.approx((1.5 * own, 1.0 + 0.04 * own**2))

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from doe.analysis.squash import SQUASH
 from doe.diagnose.compared_features import BIAS_ERROR, Instrument, MeasuredFeatures, weighed
-from doe.diagnose.emulator import SQUASH, Lessons, Way
+from doe.diagnose.emulator import Lessons, Way
 from doe.errors import StatisticsError
 
 NAMES = ("height", "width", "area", "lean")

@@ -16,12 +16,13 @@ from doe.diagnose.candidate_experiments import _with_bodies, checked_by_bodies
 from doe.diagnose.compared_features import MeasuredFeatures, weighed
 from doe.diagnose.emulator import Lessons, Way
 from doe.diagnose.next_experiment import DRAWS, CandidateExperiment, Prediction, chance_of_an_answer
-from doe.diagnose.posterior import TEMPERATURE, Posterior
+from doe.diagnose.posterior import TEMPERATURE, Data, Posterior, posterior
 from doe.diagnose.result import BODIES_ALONE, Amplitude
 from doe.diagnose.verdict import THRESHOLD
 from doe.measurement import load_measurement
 from doe.measurement.bodies import MeasuredBody
 from solver import EFFECTS
+from tests.doe.diagnose.test_posterior import SIZE, emulator
 from tests.doe.measurement.folders import write
 
 MASS = 2500.0 * math.pi / 6.0 * 12e-3**3
@@ -71,6 +72,36 @@ def test_the_evidence_is_that_of_pours_and_bodies_together(data):
         gained = both.fits[name].log_evidence - by_pours.fits[name].log_evidence
         assert gained == pytest.approx(-0.5 * off**2), name
     assert both.log_outside - by_pours.log_outside == pytest.approx(-0.5 * off**2)
+
+
+def test_a_parameter_that_is_off_counts_once_for_piles_and_bodies():
+    """Both have linear answers to it, so their joint density is one normal density (ν is large)."""
+    rng = np.random.default_rng(3)
+    slope, slopes = 2.0 * rng.standard_normal(SIZE), np.array([[3.0], [-1.0]])
+    taught = emulator({}, freedom=10**8, sensitivity=slope)
+    factor = np.linalg.cholesky(np.eye(2) + slopes @ slopes.T)
+
+    def of(z, y):
+        bodies = BodyEvidence(None, (None, None), np.linalg.solve(factor, y), slopes, factor, ())
+        return posterior(taught, Data(z, 6, bodies=bodies), temperature=1.0, pairs=False).fits["base"]
+
+    answers = np.concatenate([slope, slopes[:, 0]])
+    found = [
+        (one, of(one[:SIZE], one[SIZE:]))
+        for theta in (0.0, 1.5, -2.0)
+        for one in [theta * answers + np.concatenate([0.4 * rng.standard_normal(SIZE), rng.standard_normal(2)])]
+    ]
+    noise = np.concatenate([found[0][1].variance, np.ones(2)])
+    both = stats.multivariate_normal(cov=np.diag(noise) + np.outer(answers, answers))
+    expected = np.array([both.logpdf(one) for one, _ in found])
+    evidence = np.array([fit.log_evidence for _, fit in found])
+    assert evidence - evidence[0] == pytest.approx(expected - expected[0], abs=1e-4)
+    for one, fit in found:
+        precision = 1.0 + answers @ (answers / noise)
+        assert fit.theta == pytest.approx([answers @ (one / noise) / precision], abs=1e-4)
+        assert fit.theta_covariance == pytest.approx(np.array([[1.0 / precision]]), rel=1e-4)
+        square = one @ np.linalg.solve(both.cov, one)
+        assert fit.p == pytest.approx(stats.chi2.sf(square, len(one)), rel=1e-3)
 
 
 def test_a_model_that_bodies_contradict_does_not_fit(data):

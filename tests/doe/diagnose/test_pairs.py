@@ -19,7 +19,8 @@ def over_every_node(taught, data, first, second):
     one, other = (posterior._nodes_of(taught, name) for name in (first, second))
     i, j = (np.flatnonzero(weigher.shifts(nodes.rows) >= SECOND) for nodes in (one, other))
     rows = (one.rows[i][:, None] + other.rows[j][None] - weigher.base.rows).reshape(-1, one.rows.shape[1])
-    return float(logsumexp(weigher.log_t(*weigher.at(rows)))) - math.log(len(rows))
+    unknown = np.zeros((1, taught.parameters)), np.eye(taught.parameters)
+    return float(logsumexp(weigher.log_t(*weigher.at(rows), *unknown))) - math.log(len(rows))
 
 
 def test_a_strong_effect_s_amplitude_is_summed_finely_enough_beside_a_weak_one():

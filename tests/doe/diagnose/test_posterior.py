@@ -9,13 +9,12 @@ import pytest
 from scipy import stats
 
 from doe.analysis.covariance import log_t, shrunk_covariance
+from doe.analysis.squash import SQUASH, Squash
 from doe.diagnose.emulator import (
     ANGLES,
     CURVATURE,
-    SQUASH,
     Emulator,
     Lessons,
-    Squash,
     Way,
     emulated,
     planar_weights,
@@ -517,13 +516,6 @@ def test_signatures_of_noise_alone_are_not_believed():
     assert np.sort(values)[-2] < 0.1 * 0.2
 
 
-def test_a_rare_large_count_is_drawn_in():
-    squash = Squash(np.zeros(1), np.ones(1))
-    small, large = squash(np.array([[0.1]])), squash(np.array([[100.0]]))
-    assert small[0, 0] == pytest.approx(0.1, rel=1e-3)
-    assert large[0, 0] == pytest.approx(SQUASH * np.arcsinh(100.0 / SQUASH))
-
-
 def truths(kinds):
     return [PlantedTruth(kind, "weak", 4.9) for kind in kinds]
 
@@ -580,9 +572,8 @@ def test_what_pours_could_gain_by_hand():
 
     def fit(z):
         none = np.zeros((2, 1))
-        return Fit(
-            "", (), np.zeros(1), np.eye(1), none, np.array(z), np.full(2, 2.0), np.array(z), np.ones(2), 0.0, 0.5
-        )
+        one, noise = np.eye(1), np.full(2, 2.0)
+        return Fit("", (), np.zeros(1), one, one, none, np.array(z), noise, np.array(z), np.ones(2), 0.0, 0.5)
 
     taught = SimpleNamespace(slopes=np.zeros((2, 1)))
     plain, blurred = (Data(np.zeros(2), 1.0, instrument=np.diag([size, 0.0])) for size in (0.0, math.sqrt(8.0)))
