@@ -3,11 +3,12 @@
 On the scales of ``doe/measurement/bodies.py``, in standard errors, a model whose effects act at amplitudes a predicts
 the measured numbers
 
-    y = y₀ + Σ_e s_e(a_e) + ε,    ε ~ N(0, 1 + K Kᵀ)
+    y = y₀ + Σ_e s_e(a_e) + K θ + ε,    θ ~ N(0, 1),    ε ~ N(0, N)
 
 y₀ and the shifts s_e follow from the declared scene, by geometry or by simulated plate tests, without any pour. K holds
-the changes per standard deviation of each calibrated parameter. Piles are weighed with what the numbers say of the
-parameters (``parameters``), so a parameter that is off counts once.
+the changes per standard deviation of each calibrated parameter θ. N is 1 and what the line K θ misses where a number is
+no linear function of a parameter. Piles are weighed with what the numbers say of the parameters (``parameters``), so a
+parameter that is off counts once.
 An apparent friction μ (1 + F/(m g)) grows with the adhesive load F on a contact, and the loads of two effects add up,
 but only approximately: simplified JKR adhesion grows with the load itself, and a body may be heavier (``TOGETHER``).
 """
@@ -30,9 +31,6 @@ from doe.record import Record
 from solver import EFFECTS, Scene, with_values
 
 FloatArray = npt.NDArray[np.float64]
-Acting = Sequence[tuple[str, float, float]]
-"""Effects that act together: name, amplitude, standard deviation of the amplitude."""
-
 PLACES = 14
 """Number of amplitudes of each sign at which an effect is set up. They are closer together towards zero, because the
 friction of an adhering body grows as 1 + c a; between them a monotone cubic interpolates (Fritsch and Butland 1984)."""
@@ -48,17 +46,31 @@ FINE = 9
 
 
 @dataclass(frozen=True, eq=False)
+class ActingModel:
+    """A model fitted to piles.
+
+    ``effects``: name, amplitude and standard deviation of the amplitude of each. ``theta``, ``unsure``: parameters
+    [standard deviations of their measurements], (k,), and their covariance, (k, k).
+    """
+
+    effects: Sequence[tuple[str, float, float]]
+    theta: FloatArray
+    unsure: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class BodyEvidence:
     """The measured numbers ``rows``, and their differences ``off`` from those of the declared ``scene``.
 
-    ``slopes``: K (q, k). ``factor``: Cholesky factor (q, q) of the covariance 1 + K Kᵀ. ``off``: (q,), whitened by it.
-    ``effects``: the candidates.
+    ``slopes``: K (q, k). ``noise``: N (q, q). ``factor``: Cholesky factor (q, q) of N + K Kᵀ. ``off``: (q,), whitened
+    by it. ``effects``: the candidates.
     """
 
     scene: Scene
     rows: tuple[MeasuredBody, ...]
     off: FloatArray
     slopes: FloatArray
+    noise: FloatArray
     factor: FloatArray
     effects: tuple[CandidateEffect, ...]
     _shifts: dict[str, PchipInterpolator | None] = field(default_factory=dict)
@@ -74,7 +86,8 @@ class BodyEvidence:
         Densities are averaged over a cell about each of ``amplitudes`` (n, p) [natural units], from 1/√``cell`` to
         √``cell`` times the amplitude; the columns are the amplitudes of the effects in turn.
         """
-        left, factor = self._left(label, amplitudes, cell ** ((np.arange(FINE) + 0.5) / FINE - 0.5))
+        left, noise = self._left(label, amplitudes, cell ** ((np.arange(FINE) + 0.5) / FINE - 0.5))
+        factor = np.asarray(np.linalg.cholesky(noise + self.slopes @ self.slopes.T), dtype=np.float64)
         logs = -0.5 * (_white(factor, left) ** 2).sum(axis=2)
         logs -= np.log(np.diag(factor) / np.diag(self.factor)).sum()
         return np.asarray(np.logaddexp.reduce(logs, axis=0) - np.log(len(logs)))
@@ -84,8 +97,8 @@ class BodyEvidence:
 
         For N(0, 1) before, θ | y ~ N(C Kᵀ N⁻¹ (y − y₀ − s), C) with C⁻¹ = 1 + Kᵀ N⁻¹ K and the covariance N of ε.
         """
-        left, factor = self._left(label, amplitudes, np.ones(1))
-        gained = np.linalg.solve(factor @ factor.T - self.slopes @ self.slopes.T, self.slopes)
+        left, noise = self._left(label, amplitudes, np.ones(1))
+        gained = np.linalg.solve(noise, self.slopes)
         covariance = np.linalg.inv(np.eye(self.slopes.shape[1]) + self.slopes.T @ gained)
         return np.asarray(left[0] @ gained @ covariance), np.asarray(covariance)
 
@@ -99,40 +112,35 @@ class BodyEvidence:
             return np.zeros((*amplitudes.shape, len(self.rows)))
         return np.asarray(known(np.clip(amplitudes, known.x[0], known.x[-1])))
 
-    def predicted(self, acting: Acting, theta: FloatArray, unsure: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Mean (q,) and covariance (q, q) of the whitened numbers with effects ``acting``.
-
-        ``theta``, ``unsure``: parameters [standard deviations] under this model, (k,), and their covariance, (k, k).
-        """
-        moved = [one for one in acting if self.moved_by(one[0])]
+    def predicted(self, model: ActingModel) -> tuple[FloatArray, FloatArray]:
+        """Mean (q,) and covariance (q, q) of the whitened numbers under ``model``."""
+        moved = [one for one in model.effects if self.moved_by(one[0])]
         still = [self.shift(name, np.array(amplitude)) for name, amplitude, _ in moved]
         mean = self._together(still, (len(self.rows),))
-        factor = self._factor_of(still)
-        covariance = factor @ factor.T + self.slopes @ (unsure - np.eye(len(theta))) @ self.slopes.T
+        covariance = self._noise_of(still) + self.slopes @ model.unsure @ self.slopes.T
         for k, (name, amplitude, deviation) in enumerate(moved):
             beside = [*still[:k], self.shift(name, np.array(amplitude + deviation)), *still[k + 1 :]]
             more = self._together(beside, mean.shape) - mean
             covariance += np.outer(more, more)
-        return _white(self.factor, mean + self.slopes @ theta), _white(self.factor, _white(self.factor, covariance).T)
+        mean = mean + self.slopes @ model.theta
+        return _white(self.factor, mean), _white(self.factor, _white(self.factor, covariance).T)
 
-    def told_apart(self, answers: Sequence[Acting]) -> npt.NDArray[np.bool_]:
+    def told_apart(self, answers: Sequence[ActingModel]) -> npt.NDArray[np.bool_]:
         """Whether ``answers`` may differ by more than a standard deviation, parameters included, in each number (q,).
 
         Amplitudes range over ``LIKELY`` standard deviations: an effect that hardly shows in piles fits best near zero.
         """
-        self.set_up(name for acting in answers for name, _, _ in acting)
-        shifts = [
-            [self.shift(name, np.array(amplitude + off * deviation)) for name, amplitude, deviation in acting]
-            for acting in answers
-            for off in (-LIKELY, 0.0, LIKELY)
-        ]
-        means = [self._together(some, (len(self.rows),)) for some in shifts]
-        return np.asarray(np.ptp(means, axis=0) > np.linalg.norm(self.factor, axis=1))
+        self.set_up(name for model in answers for name, _, _ in model.effects)
+        means, variances = [], []
+        for model in answers:
+            for off in (-LIKELY, 0.0, LIKELY):
+                effects = [self.shift(name, np.array(a + off * deviation)) for name, a, deviation in model.effects]
+                means.append(self._together(effects, (len(self.rows),)) + self.slopes @ model.theta)
+            variances.append(np.diag(self.noise + self.slopes @ model.unsure @ self.slopes.T))
+        return np.asarray(np.ptp(means, axis=0) ** 2 > np.max(variances, axis=0))
 
     def _left(self, label: str, amplitudes: FloatArray, steps: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The numbers less their shift by ``label`` at ``steps`` of ``amplitudes``, (s or s², n, q), and the Cholesky
-        factor (q, q) of their covariance.
-        """
+        """The numbers less their shift by ``label`` at ``steps`` of ``amplitudes``, (s or s², n, q), and N, (q, q)."""
         moved, column = [], 0
         for name in [] if label == "base" else label.split("+"):
             if self.moved_by(name):
@@ -141,7 +149,7 @@ class BodyEvidence:
         if len(moved) == 2:
             moved = [moved[0][:, None], moved[1][None]]
         shift = self._together(moved, (len(amplitudes), len(self.rows))).reshape(-1, len(amplitudes), len(self.rows))
-        return self.factor @ self.off - shift, self._factor_of(moved)
+        return self.factor @ self.off - shift, self._noise_of(moved)
 
     def _together(self, shifts: Sequence[FloatArray], shape: tuple[int, ...]) -> FloatArray:
         """Shift of the numbers by effects that act together; ``shape``: shape of the result without effects."""
@@ -153,14 +161,14 @@ class BodyEvidence:
                 total[..., q] = np.log(load * math.prod(np.minimum(one, 1.0) for one in factors)) / row.deviation
         return total
 
-    def _factor_of(self, shifts: Sequence[FloatArray]) -> FloatArray:
-        """Cholesky factor of the covariance under these shifts; two together are known less well (``TOGETHER``)."""
+    def _noise_of(self, shifts: Sequence[FloatArray]) -> FloatArray:
+        """N (q, q) under these shifts; two together are known less well (``TOGETHER``)."""
         more = np.zeros(len(self.rows))
         for q, row in enumerate(self.rows):
             both = len(shifts) > 1 and all(np.abs(one[..., q]).max(initial=0.0) > NEGLIGIBLE for one in shifts)
             if both and QUANTITIES[row.quantity].loads:
                 more[q] = TOGETHER / row.deviation
-        return np.asarray(np.linalg.cholesky(self.factor @ self.factor.T + np.diag(more**2)))
+        return np.asarray(self.noise + np.diag(more**2))
 
     def _shift(self, name: str) -> PchipInterpolator | None:
         """Shift of the numbers as a function of the effect's amplitude; None if the effect moves none of them."""
@@ -211,7 +219,7 @@ def body_evidence(measurement: Measurement, declared: Declared) -> BodyEvidence 
     return found
 
 
-def wanted_bodies(measurement: Measurement, declared: Declared, answers: Sequence[Acting]) -> BodyEvidence | None:
+def wanted_bodies(measurement: Measurement, declared: Declared, answers: Sequence[ActingModel]) -> BodyEvidence | None:
     """Measurements of single bodies, not made yet, in which ``answers`` differ; None if there are none.
 
     Standard errors are the usual ones of each quantity.
@@ -240,11 +248,13 @@ def _evidence(measurement: Measurement, declared: Declared, rows: Sequence[Measu
         for side in (-1.0, 1.0)
     ]
     still, *moved = body_numbers([scene, *sides], rows)
-    both = np.array(moved).reshape(-1, 2, len(rows)) / errors
-    slopes = 0.5 * (both[:, 1] - both[:, 0]).T
-    factor = np.linalg.cholesky(np.eye(len(rows)) + slopes @ slopes.T)
-    off = (np.array([one.value for one in rows]) - still) / errors
-    return BodyEvidence(scene, tuple(rows), solve_triangular(factor, off, lower=True), slopes, factor, declared.effects)
+    both = (np.array(moved).reshape(-1, 2, len(rows)) - still) / errors
+    slopes, bends = 0.5 * (both[:, 1] - both[:, 0]).T, 0.5 * (both[:, 1] + both[:, 0]).T
+    # The line misses κ θ² of y = K θ + κ θ², whose mean square is Σᵢⱼ κᵢ κⱼᵀ + 2 Σᵢ κᵢ κᵢᵀ.
+    noise = np.eye(len(rows)) + np.outer(bends.sum(axis=1), bends.sum(axis=1)) + 2.0 * bends @ bends.T
+    factor = np.linalg.cholesky(noise + slopes @ slopes.T)
+    off = solve_triangular(factor, (np.array([one.value for one in rows]) - still) / errors, lower=True)
+    return BodyEvidence(scene, tuple(rows), off, slopes, noise, factor, declared.effects)
 
 
 @dataclass(frozen=True)

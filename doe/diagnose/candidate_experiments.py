@@ -18,7 +18,7 @@ import numpy.typing as npt
 from scipy.linalg import block_diag
 
 from doe.analysis.covariance import shrunk_means
-from doe.declared.bodies import Acting, BodyEvidence, wanted_bodies
+from doe.declared.bodies import ActingModel, BodyEvidence, wanted_bodies
 from doe.declared.model import Declared
 from doe.declared.points import AS_IT_IS
 from doe.declared.pours import ModelPours
@@ -121,7 +121,7 @@ def checked_by_bodies(
     acts = {label: acting_in(found, label) for label in weights}
     if (bodies := wanted_bodies(measurement, declared, list(acts.values()))) is None:
         return ()
-    predictions = {label: _of_bodies(bodies, found, label) for label in weights}
+    predictions = {label: Prediction(*bodies.predicted(acts[label])) for label in weights}
     # Nothing is poured: all noise is in the predictions.
     (ranked,) = rank_experiments([CandidateExperiment(BODIES_ALONE, predictions)], weights, math.inf)
     return (Suggestion(ranked, {}, measurement.fit[0].name, tuple(weights), (), 0, bodies=bodies.asked),)
@@ -188,24 +188,20 @@ def _item(
     return CandidateExperiment(set_up.name, predictions)
 
 
-def acting_in(found: Posterior, label: str) -> Acting:
-    """Effects that act in the best fit of ``label``: name, amplitude and its standard deviation."""
-    return [(a.effect, a.value, (a.high - a.low) / INTERVAL) for a in found.fits[label].amplitudes]
+def acting_in(found: Posterior, label: str) -> ActingModel:
+    """The best fit of ``label``, for single bodies."""
+    fit = found.fits[label]
+    effects = [(a.effect, a.value, (a.high - a.low) / INTERVAL) for a in fit.amplitudes]
+    return ActingModel(effects, fit.theta, fit.theta_covariance)
 
 
 def _with_bodies(item: CandidateExperiment, found: Posterior, bodies: BodyEvidence) -> CandidateExperiment:
     """``item`` with predictions of the single-body numbers; adding a pour's noise to them is slightly too much."""
     predictions = {}
     for label, one in item.predictions.items():
-        more = _of_bodies(bodies, found, label)
-        joined = np.append(one.mean, more.mean), block_diag(one.covariance, more.covariance)
-        predictions[label] = Prediction(*joined)
+        mean, covariance = bodies.predicted(acting_in(found, label))
+        predictions[label] = Prediction(np.append(one.mean, mean), block_diag(one.covariance, covariance))
     return replace(item, predictions=predictions)
-
-
-def _of_bodies(bodies: BodyEvidence, found: Posterior, label: str) -> Prediction:
-    fit = found.fits[label]
-    return Prediction(*bodies.predicted(acting_in(found, label), fit.theta, fit.theta_covariance))
 
 
 def _rows(emulator: Emulator, training: TrainingPours, found: Posterior, label: str) -> FloatArray:

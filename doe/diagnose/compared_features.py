@@ -40,7 +40,8 @@ class MeasuredFeatures:
     """Features that a condition's data offer: names, replicates (r, d) and the stated error of each feature, (d,).
 
     ``scalars``: number of features that are not read off a surface. ``sight``: what the scans were seen through;
-    ``axis``, ``axis_error``: place of the rig's axis in their coordinates, and its error [m].
+    ``axis``, ``axis_error``: place of the rig's axis in their coordinates, and its error [m]; ``turned``: whether the
+    rig was turned on its bench.
     """
 
     condition: str
@@ -52,6 +53,7 @@ class MeasuredFeatures:
     scalars: int = 0
     axis: tuple[float, float] | None = None
     axis_error: float = 0.0
+    turned: bool = False
     sight: Sight = PERFECT
 
     def pours(self, columns: npt.NDArray[np.int64]) -> FloatArray:
@@ -77,6 +79,7 @@ def measured(condition: Condition, offer: str | None = None) -> MeasuredFeatures
         scalars=len(names.scalars),
         axis=next((one.axis for one in condition.surfaces.values()), None),
         axis_error=max((one.axis_error for one in condition.surfaces.values()), default=0.0),
+        turned=condition.turned,
         sight=sight_of(condition) if found == SCAN else PERFECT,
     )
 
@@ -248,7 +251,8 @@ def _loadings(
     """I: response of z to the errors of instruments, which averaging does not reduce, (D, q).
 
     Stated errors of numbers are independent. The error of an axis, and that of the bias of a sight, move all features
-    read off a surface together: in all conditions whose scans state the same axis, by a scanner that stayed in place.
+    read off a surface together. An axis is off equally in all conditions whose scans state the same one, by a scanner
+    that stayed in place, unless the rig was turned under it.
     """
     size, first, found = len(emulator.whitening), 0, []
     common: dict[tuple[object, ...], FloatArray] = {}
@@ -259,7 +263,10 @@ def _loadings(
         stated = one.instrument[chosen] * slope
         for k in np.flatnonzero(stated > 0.0):
             found.append(stated[k] * np.eye(size)[places[k]])
-        for of, change in enumerate([*instruments[c].axis, BIAS_ERROR * instruments[c].bias] if instruments else []):
-            common.setdefault((of, one.axis), np.zeros(size))[places] = change[chosen] * slope
+        place = c if one.axis is None else (one.axis, one.turned)
+        for of, change in zip("xy", instruments[c].axis if instruments else [], strict=False):
+            common.setdefault((of, place), np.zeros(size))[places] = change[chosen] * slope
+        if instruments:
+            common.setdefault(("bias",), np.zeros(size))[places] = BIAS_ERROR * instruments[c].bias[chosen] * slope
     found += [moved for moved in common.values() if moved.any()]
     return np.asarray(emulator.whitening @ np.array(found).T, dtype=np.float64) if found else np.zeros((size, 0))

@@ -58,7 +58,7 @@ SCATTERS = (0.5, 4.0)
 """Range of the ratio of a pour's variance under an effect to that of a base-model pour."""
 FLAT = 1e-9
 """Prior precision of coefficients with a flat prior."""
-FAR = 2.0
+FAR = 1.6
 """Distance of a parameter from its mean [standard deviations] beyond which a pour shares no mean with nearer ones."""
 ANGLES = (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)
 """Directions [rad] in the plane in which an effect with two amplitudes is poured."""
@@ -310,7 +310,7 @@ def emulated(
     told = [lessons.amplitude[lessons.way == w] @ shift[lessons.way == w] / square[w] for w in range(m)]
     signatures = np.stack(told or [0.0 * z[0]])
     noise = 1.0 / square + 1.0 / near.sum() if m else np.ones(1)
-    variances, axes = signature_prior(signatures, noise * unturned.mean())
+    variances, axes = signature_prior(signatures, noise, unturned)
     pour = unturned @ axes**2
     scales = signature_scales(signatures @ axes, noise[:, None] * pour, variances) if m else np.zeros(0)
     if not shrunk:
@@ -346,16 +346,17 @@ def _excess(z: FloatArray, lessons: Lessons, ways: int) -> FloatArray:
     return np.array([float(a @ some) / (float(a @ a) + FEW_POURS) for a, some in by_way])
 
 
-def signature_prior(signatures: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
+def signature_prior(signatures: FloatArray, noise: FloatArray, pour: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Prior variances v (D,) of ``signatures`` (m, D) along their principal axes, and these axes as columns, (D, D).
 
-    ``noise``: noise variance of each signature, (m,).
+    ``noise``: noise variance of each signature, (m,), times that of a ``pour`` in each feature, (D,). If pours are not
+    alike in all features, n and D of the largest eigenvalue are those with the same Σ n and Σ n².
     """
-    m, size = signatures.shape
-    level = float(noise.mean())
+    (m, size), level = signatures.shape, float(noise.mean()) * pour
     values, axes = np.linalg.eigh(signatures.T @ signatures / m)
-    leading = np.maximum(values - level * (1.0 + np.sqrt(size / m)) ** 2, 0.0)
-    rest = max(LEAST_VARIANCE, (float(values.sum()) - size * level - float(leading.sum())) / size)
+    alike = float((level**2).sum() / level.sum())
+    leading = np.maximum(values - alike * (1.0 + np.sqrt(level.sum() / alike / m)) ** 2, 0.0)
+    rest = max(LEAST_VARIANCE, float(values.sum() - level.sum() - leading.sum()) / size)
     return leading + rest, axes
 
 

@@ -36,6 +36,7 @@ from scipy.special import logsumexp
 
 from doe.analysis.cells import CELL, NEGLIGIBLE, Places, parted_cells
 from doe.analysis.covariance import log_t
+from doe.analysis.weighted import mean_towards, weighted_interval
 from doe.declared.bodies import BodyEvidence
 from doe.diagnose.emulator import ANGLES, Emulator, planar_weights
 from doe.diagnose.result import Amplitude
@@ -110,9 +111,10 @@ class Fit:
     ----------
     amplitudes
         Of its effects, in order.
-    theta, theta_covariance, prior
-        Posterior of the parameters [standard deviations of their measurements], (k,) and (k, k), and their covariance
-        before the piles are seen, (k, k).
+    theta, theta_covariance
+        Posterior of the parameters [standard deviations of their measurements], (k,) and (k, k).
+    centre, prior
+        Their mean and covariance before the piles are seen, (k,) and (k, k).
     slopes
         Response to the parameters there, (D, k).
     z, variance
@@ -132,6 +134,7 @@ class Fit:
     amplitudes: tuple[Amplitude, ...]
     theta: FloatArray
     theta_covariance: FloatArray
+    centre: FloatArray
     prior: FloatArray
     slopes: FloatArray
     z: FloatArray
@@ -285,7 +288,9 @@ def gain_by_pours(one: Fit, other: Fit, emulator: Emulator, data: Data) -> float
     predictions and S the covariance of the data about them. Without u in S it is the limit for any number of pours; the
     rise is this limit minus the present value. It is negligible if the data's own noise dominates S.
     """
-    loadings, apart = np.concatenate([emulator.slopes, data.instrument], axis=1), one.still - other.still
+    slopes, root = emulator.slopes, np.linalg.cholesky(0.5 * (one.prior + other.prior))
+    loadings = np.concatenate([slopes @ root, data.instrument], axis=1)
+    apart = one.still - other.still + slopes @ (one.centre - other.centre)
     noise, unsure = 0.5 * (one.variance + other.variance), 0.5 * (one.unsure + other.unsure)
     now, then = (
         0.5 * float(apart @ np.linalg.solve(np.diag(left) + loadings @ loadings.T, apart))
@@ -400,7 +405,7 @@ class _Weigher:
         prediction at the fit, (n, D) each; and the slopes there, (n, D, k).
         """
         precision = np.linalg.inv(prior)
-        theta = np.zeros((len(mean), self._emulator.parameters))
+        theta = np.clip(np.broadcast_to(centre, (len(mean), len(prior))), -FARTHEST, FARTHEST)
         for _ in range(STEPS):
             moved, unsure, slopes = self._emulator.moved(theta)
             left = self._data.z - mean - moved + (slopes @ (theta - centre)[:, :, None])[:, :, 0]
@@ -452,14 +457,15 @@ class _Weigher:
         amplitudes: list[Amplitude] = []
         for effect in [] if label == "base" else label.split("+"):
             own = nodes.natural[:, len(amplitudes) : len(amplitudes) + sizes[effect]]
-            for index, value in enumerate(_towards(own, best, weights)):
-                interval, end = _interval(own[:, index], weights), bool(nodes.ends[best])
+            for index, value in enumerate(mean_towards(own, best, weights)):
+                interval, end = weighted_interval(own[:, index], weights), bool(nodes.ends[best])
                 amplitudes.append(Amplitude(effect, index, float(value), *interval, end))
         return Fit(
             label,
             tuple(amplitudes),
             theta,
             covariance,
+            centre[0],
             prior,
             slopes,
             z,
@@ -469,22 +475,3 @@ class _Weigher:
             float(logsumexp(weighed)),
             float(stats.f.sf(square / numbers, numbers, self._freedom)),
         )
-
-
-def _towards(natural: FloatArray, best: int, weights: FloatArray) -> FloatArray:
-    """Mean amplitudes (p,) of the nodes ``natural`` (n, p) with the sign, or within 45° of the direction, of the best.
-
-    Over all signs or directions the mean is near zero where the data do not tell them apart, and nobody's amplitude.
-    """
-    sizes = np.linalg.norm(natural, axis=1)
-    near = natural @ natural[best] > (math.sqrt(0.5) - 1e-9) * sizes * sizes[best]
-    mean, size = weights[near] @ natural[near], weights[near] @ sizes[near] / weights[near].sum()
-    return np.asarray(size * mean / np.linalg.norm(mean), dtype=np.float64)
-
-
-def _interval(values: FloatArray, weights: FloatArray) -> tuple[float, float]:
-    """95 % interval of ``values`` with ``weights``, interpolated linearly between them."""
-    order = np.argsort(values)
-    below = np.cumsum(weights[order]) - 0.5 * weights[order]
-    low, high = np.interp([0.025, 0.975], below, values[order])
-    return float(low), float(high)

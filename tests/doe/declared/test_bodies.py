@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from doe.declared.bodies import TOGETHER, body_evidence, body_rows, wanted_bodies
+from doe.declared.bodies import TOGETHER, ActingModel, body_evidence, body_rows, wanted_bodies
 from doe.declared.model import declare
 from doe.measurement import load_measurement
 from doe.measurement.bodies import MeasuredBody
@@ -85,7 +85,9 @@ def test_what_is_calibrated_is_known_as_well_as_the_parameter(data):
     data = replace(data, parameters=(*data.parameters, density))
     found = evidence_of(data, MeasuredBody("bead", "mass", 1.1 * MASS, 0.011 * MASS))
     error = 430.0 / math.sqrt(12.0) / 2500.0
-    assert found.off == pytest.approx([math.log(1.1) / math.hypot(0.01, error)], rel=1e-3)
+    # And by how much the logarithm bends over the deviation.
+    bend = math.sqrt(3.0) * 0.5 * math.log1p(-(error**2))
+    assert found.off == pytest.approx([math.log(1.1) / math.hypot(0.01, bend, math.atanh(error))], rel=1e-6)
     assert evidence_of(data) is None
 
 
@@ -97,7 +99,8 @@ def test_two_frictions_share_what_is_not_known_of_the_declared_one(data):
     sure = evidence_of(data, *rows)
     assert sure.off @ sure.off == pytest.approx(2.0 * (math.log(1.2) / 0.05) ** 2)
     found = evidence_of(replace(data, parameters=(friction,)), *rows)
-    covariance = 0.05**2 * np.eye(2) + math.atanh(0.1) ** 2
+    # The logarithm bends by ½ ln(1 − 0.1²) over a deviation, and in the mean square by 3 times its square.
+    covariance = 0.05**2 * np.eye(2) + math.atanh(0.1) ** 2 + 3.0 * (0.5 * math.log1p(-0.01)) ** 2
     off = np.full(2, math.log(1.2))
     assert found.off @ found.off == pytest.approx(off @ np.linalg.solve(covariance, off))
 
@@ -114,15 +117,19 @@ def test_loads_of_two_adhesions_add_up_and_a_lower_friction_is_a_factor(data, se
     found = evidence_of(data, MeasuredBody("bead", row, wanted, 0.05 * wanted))
     width = math.hypot(0.05, TOGETHER)
     assert found.log_density(both, amplitudes, 1.0 + 1e-9) == pytest.approx([-math.log(width / 0.05)], abs=0.01)
-    mean, covariance = found.predicted([(name, at[name], 0.0) for name in names], *unknown(found))
+    mean, covariance = found.predicted(model(found.slopes.shape[1], *((name, at[name], 0.0) for name in names)))
     assert mean == pytest.approx(found.off, rel=0.01)
     assert covariance == pytest.approx(np.array([[(width / 0.05) ** 2]]))
 
 
-def unknown(found):
-    """Parameters of which the piles say nothing."""
-    k = found.slopes.shape[1]
-    return np.zeros(k), np.eye(k)
+def model(k, *effects):
+    """``effects`` with ``k`` parameters of which the piles say nothing."""
+    return ActingModel(effects, np.zeros(k), np.eye(k))
+
+
+def wanted_by(data, *answers):
+    declared = declare(data, NAMES)
+    return wanted_bodies(data, declared, [model(len(declared.parameters), *one) for one in answers])
 
 
 def acting(*names, share=0.3):
@@ -143,29 +150,28 @@ def acting(*names, share=0.3):
     ],
 )
 def test_what_tells_two_answers_apart_is_asked_for(data, answers, wanted):
-    found = wanted_bodies(data, declare(data, NAMES), answers)
+    found = wanted_by(data, *answers)
     assert ([] if found is None else [row.quantity for row in found.rows]) == wanted
 
 
 def test_what_an_effect_that_fits_weakly_may_do_is_asked_for(data):
     known, loose = ([("density_error", 0.005, deviation)] for deviation in (0.001, 0.01))
-    assert wanted_bodies(data, declare(data, NAMES), [known, []]) is None
-    assert [row.quantity for row in wanted_bodies(data, declare(data, NAMES), [loose, []]).rows] == ["mass"]
+    assert wanted_by(data, known, []) is None
+    assert [row.quantity for row in wanted_by(data, loose, []).rows] == ["mass"]
 
 
 def test_what_is_measured_is_not_asked_for_again(data):
     data = replace(data, bodies=(MeasuredBody("bead", "mass", MASS, 0.01 * MASS),))
-    assert wanted_bodies(data, declare(data, NAMES), [acting("density_error"), []]) is None
+    assert wanted_by(data, acting("density_error"), []) is None
 
 
 def test_a_prediction_knows_how_well_its_amplitude_is_known(data):
-    found = wanted_bodies(data, declare(data, NAMES), [[("density_error", 0.1, 0.05)], []])
-    mean, covariance = found.predicted(
-        [("density_error", 0.1, 0.05), ("rolling_resistance", 0.1, 0.02)], *unknown(found)
-    )
+    found = wanted_by(data, [("density_error", 0.1, 0.05)], [])
+    acts = [("density_error", 0.1, 0.05), ("rolling_resistance", 0.1, 0.02)]
+    mean, covariance = found.predicted(model(found.slopes.shape[1], *acts))
     assert mean == pytest.approx([math.log(1.1) / 0.01], rel=1e-3)
     assert covariance == pytest.approx(np.array([[1.0 + (math.log(1.15 / 1.1) / 0.01) ** 2]]), rel=0.01)
-    assert found.predicted([], *unknown(found))[0] == pytest.approx([0.0])
+    assert found.predicted(model(found.slopes.shape[1]))[0] == pytest.approx([0.0])
 
 
 def test_between_amplitudes_that_were_set_up_a_friction_is_known_to_a_fiftieth_of_its_shift(data):
@@ -190,16 +196,31 @@ def test_two_frictions_say_what_the_parameter_is_and_piles_what_a_third_will_be(
     data = replace(data, parameters=(friction,))
     found = evidence_of(data, *[MeasuredBody("bead", name, 0.36, 0.018) for name in names])
     slope, off = math.atanh(0.1) / 0.05, math.log(1.2) / 0.05
+    bend = 0.5 * math.log1p(-0.01) / 0.05
+    # A mean of two numbers of variance 1, with what both miss of the line.
+    told = 1.0 / (0.5 + 3.0 * bend**2)
     means, covariance = found.parameters("base", np.zeros((3, 0)))
-    assert covariance == pytest.approx(np.array([[1.0 / (1.0 + 2.0 * slope**2)]]))
-    assert means == pytest.approx(np.full((3, 1), 2.0 * slope * off * covariance[0, 0]))
+    assert covariance == pytest.approx(np.array([[1.0 / (1.0 + slope**2 * told)]]))
+    assert means == pytest.approx(np.full((3, 1), slope * off * told * covariance[0, 0]))
     # An effect that explains the numbers leaves the parameter where it was.
     work = 0.2 * MASS * 9.81 / (3.0 * math.pi * 6e-3)
     explained, _ = found.parameters("adhesion_jkr", np.array([[work]]))
     assert abs(explained[0, 0]) < 0.05 * means[0, 0]
-    (other,) = [wanted_bodies(data, declare(data, NAMES), [acting("kinetic_friction"), []])]
-    mean, spread = other.predicted([], np.array([1.5]), np.array([[0.04]]))
+    other = wanted_by(data, acting("kinetic_friction"), [])
+    mean, spread = other.predicted(ActingModel([], np.array([1.5]), np.array([[0.04]])))
     q = [row.quantity for row in other.rows].index("apparent_kinetic_friction")
     raw = (other.factor @ mean)[q], (other.factor @ spread @ other.factor.T)[q, q]
     own = other.slopes[q, 0]
-    assert raw == pytest.approx((1.5 * own, 1.0 + 0.04 * own**2))
+    assert raw == pytest.approx((1.5 * own, other.noise[q, q] + 0.04 * own**2))
+
+
+@pytest.mark.parametrize("off", [-1.39, 1.39])
+def test_a_parameter_known_by_a_wide_range_alone_is_not_told_too_surely(data, off):
+    """The logarithm of a friction between 0.1 and 0.6 is far from a line: the stated error holds what that does."""
+    friction = MeasuredParameter("pair.glass.steel.static_friction", 0.1, 0.6, None, None, "1")
+    deviation = 0.5 / math.sqrt(12.0)
+    there = 0.35 + off * deviation
+    row = MeasuredBody("bead", "apparent_static_friction", there, 0.05 * there)
+    found = evidence_of(replace(data, parameters=(friction,)), row)
+    means, covariance = found.parameters("base", np.zeros((1, 0)))
+    assert abs(means[0, 0] - off) < 2.0 * math.sqrt(covariance[0, 0])

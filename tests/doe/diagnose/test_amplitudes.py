@@ -2,12 +2,9 @@
 
 import math
 
-import numpy as np
 import pytest
-from scipy import stats
 
 from doe.diagnose.emulator import Way
-from doe.diagnose.posterior import _interval as interval_of
 from tests.doe.diagnose.test_posterior import emulator, judged, planar
 from tests.doe.validation.test_limit_ruler import unit
 
@@ -24,12 +21,3 @@ def test_of_a_sign_that_nothing_tells_the_amplitude_is_not_averaged_away():
     # Six pours of data know it to 0.41/6 of itself, and the mean is over a prior even in the logarithm.
     assert abs(found.value) == pytest.approx(0.21, rel=0.15)
     assert found.low < -0.15 < 0.15 < found.high
-
-
-def test_an_amplitude_s_interval_is_that_of_its_weights():
-    """Nodes 0.1 apart with the weights of a normal number of deviation 0.7 about 1; half of a step is 0.05."""
-    nodes = np.random.default_rng(0).permutation(np.arange(-4.0, 6.05, 0.1))
-    weights = stats.norm.pdf(nodes, 1.0, 0.7)
-    assert interval_of(nodes, weights / weights.sum()) == pytest.approx(
-        stats.norm.ppf([0.025, 0.975], 1.0, 0.7), abs=5e-3
-    )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from doe.diagnose.compared_features import Instrument, weighed
-from doe.diagnose.emulator import BEND, Lessons, Way, emulated
+from doe.diagnose.emulator import BEND, Lessons, Way, emulated, signature_prior
 from tests.doe.diagnose.test_compared_features import WAYS, D, data, lessons
 
 SIZES, EFFECTS = (8, 8, 8), 9
@@ -74,6 +74,10 @@ def test_pours_with_a_parameter_far_off_share_no_mean_with_the_others():
     taught = emulated(some, WAYS)
     assert taught.squashes[0].deviation == pytest.approx(np.ones(D), rel=0.35)
     assert taught.freedom == 40 - 3 - 1
+    # All pours but the far ones are at a bend of zero, and the effect does nothing.
+    assert taught.squashes[0].centre == pytest.approx(np.zeros(D), abs=0.7)
+    still, pushed = (taught.features(taught.at(row[None])[0][0]) for row in (taught.row(), taught.row({0: 1.0})))
+    assert pushed - still == pytest.approx(np.zeros(D), abs=1.0)
 
 
 def test_an_axis_of_a_scanner_that_stayed_in_place_is_off_equally_everywhere():
@@ -83,13 +87,13 @@ def test_an_axis_of_a_scanner_that_stayed_in_place_is_off_equally_everywhere():
     error = Instrument(np.zeros(D), np.array([[0.0, 0.0, 0.0, 2.0], [0.0, 0.0, 0.0, 0.0]]))
     off = np.array([0.0, 0.0, 0.0, 2.0])
 
-    def said(second, sign):
+    def said(second, sign, turned=False):
         """p of the base model, and the number of errors."""
         values = [rng.standard_normal((6, D)) * 0.3 + off, rng.standard_normal((6, D)) * 0.3 + sign * off]
         found = weighed(
             taught,
             WAYS,
-            [data(values[0], axis=(0.0, 0.0)), data(values[1], "high", axis=second)],
+            [data(values[0], axis=(0.0, 0.0)), data(values[1], "high", axis=second, turned=turned)],
             [error, error],
         )
         return found.posterior.fits["base"].p, found.data.instrument.shape[1]
@@ -101,3 +105,17 @@ def test_an_axis_of_a_scanner_that_stayed_in_place_is_off_equally_everywhere():
     # One scanner that is off cannot be off to opposite sides.
     assert said(in_place, -1.0)[0] < 1e-3
     assert said(anew, -1.0)[0] > 0.1
+    # Under a rig that is turned it is off to the other side, in the rig's frame.
+    assert said(in_place, -1.0, turned=True)[0] > 0.1
+    # Where no axis is stated, the centre of each volume stands for it.
+    assert said(None, 1.0)[1] == 2
+
+
+def test_noise_of_unequal_size_is_not_believed_either():
+    """The largest eigenvalue that noise alone produces: with nine tenths of the weight on half of the features."""
+    rng, pour = np.random.default_rng(0), np.repeat([1.8, 0.2], 30)
+    noise = np.full(25, 0.2)
+    most = [
+        signature_prior(np.sqrt(0.2 * pour) * rng.standard_normal((25, 60)), noise, pour)[0].max() for _ in range(40)
+    ]
+    assert np.mean([one > 0.1 * 0.2 * 1.8 for one in most]) < 0.3

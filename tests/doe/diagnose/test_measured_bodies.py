@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from doe.declared.bodies import BodyEvidence, body_evidence, wanted_bodies
+from doe.declared.bodies import ActingModel, BodyEvidence, body_evidence, wanted_bodies
 from doe.declared.budget import Budget
 from doe.declared.model import declare
 from doe.diagnose import diagnosis
@@ -82,7 +82,7 @@ def test_a_parameter_that_is_off_counts_once_for_piles_and_bodies():
     factor = np.linalg.cholesky(np.eye(2) + slopes @ slopes.T)
 
     def of(z, y):
-        bodies = BodyEvidence(None, (None, None), np.linalg.solve(factor, y), slopes, factor, ())
+        bodies = BodyEvidence(None, (None, None), np.linalg.solve(factor, y), slopes, np.eye(2), factor, ())
         return posterior(taught, Data(z, 6, bodies=bodies), temperature=1.0, pairs=False).fits["base"]
 
     answers = np.concatenate([slope, slopes[:, 0]])
@@ -118,8 +118,10 @@ def test_a_follow_up_that_asks_for_bodies_knows_what_they_will_tell(data):
     """Pours that say nothing, and a mass ten standard errors off by one answer: a balance nearly always finds it."""
     nothing = Prediction(np.zeros(1), np.zeros((1, 1)))
     item = CandidateExperiment("as it is", dict.fromkeys(ALIKE, nothing))
-    answers = [[("density_error", 0.1, 1e-6)], [("rolling_resistance", 0.1, 1e-6)]]
-    bodies = wanted_bodies(data, declare(data, tuple(EFFECTS)), answers)
+    declared = declare(data, tuple(EFFECTS))
+    k = len(declared.parameters)
+    answers = [ActingModel([(name, 0.1, 1e-6)], np.zeros(k), np.eye(k)) for name in ALIKE]
+    bodies = wanted_bodies(data, declared, answers)
     found = known(compared(None).posterior)
     weights = dict.fromkeys(ALIKE, 0.5)
     assert chance_of_an_answer(item, weights, 6) == 0.0

@@ -507,10 +507,10 @@ def test_the_scatter_of_groups_of_two_is_that_of_one_pour():
 def test_signatures_of_noise_alone_are_not_believed():
     rng = np.random.default_rng(0)
     noise = np.full(18, 0.2)
-    nothing, _ = signature_prior(np.sqrt(0.2) * rng.standard_normal((18, 90)), noise)
+    nothing, _ = signature_prior(np.sqrt(0.2) * rng.standard_normal((18, 90)), noise, np.ones(90))
     assert nothing.max() < 0.1 * 0.2
     along = rng.standard_normal((18, 1)) * 5.0 * np.eye(90)[:1]
-    values, axes = signature_prior(along + np.sqrt(0.2) * rng.standard_normal((18, 90)), noise)
+    values, axes = signature_prior(along + np.sqrt(0.2) * rng.standard_normal((18, 90)), noise, np.ones(90))
     assert values.max() == pytest.approx((along**2).sum() / 18, rel=0.3)
     assert abs(axes[0, values.argmax()]) > 0.95
     assert np.sort(values)[-2] < 0.1 * 0.2
@@ -570,10 +570,10 @@ def test_a_signature_that_is_only_noise_is_believed_to_be_small():
 def test_what_pours_could_gain_by_hand():
     """Δ = 3 in one feature of variance 2, 1 of which more pours take away: ½ 9/1 − ½ 9/2; 8 more by an instrument."""
 
-    def fit(z):
+    def fit(z, prior=1.0):
         none = np.zeros((2, 1))
-        one, noise = np.eye(1), np.full(2, 2.0)
-        return Fit("", (), np.zeros(1), one, one, none, np.array(z), noise, np.array(z), np.ones(2), 0.0, 0.5)
+        known, noise = (np.zeros(1), np.eye(1), np.zeros(1), prior * np.eye(1)), np.full(2, 2.0)
+        return Fit("", (), *known, none, np.array(z), noise, np.array(z), np.ones(2), 0.0, 0.5)
 
     taught = SimpleNamespace(slopes=np.zeros((2, 1)))
     plain, blurred = (Data(np.zeros(2), 1.0, instrument=np.diag([size, 0.0])) for size in (0.0, math.sqrt(8.0)))
@@ -582,3 +582,6 @@ def test_what_pours_could_gain_by_hand():
     # What a parameter can do as well is nothing that they differ by.
     turned = SimpleNamespace(slopes=np.array([[1e3], [0.0]]))
     assert gain_by_pours(fit([3.0, 1.0]), fit([0.0, 1.0]), turned, plain) == pytest.approx(0.0, abs=1e-4)
+    # Unless bodies have told the parameter.
+    told = gain_by_pours(fit([3.0, 1.0], 1e-12), fit([0.0, 1.0], 1e-12), turned, plain)
+    assert told == pytest.approx(2.25, abs=1e-3)

@@ -21,7 +21,7 @@ def posterior(nothing, outside, effects, badly=(), base=DOUBTED / 2.0, off=3.0):
     none = np.zeros(0)
     likely = {"base": base} | dict.fromkeys(effects, 0.5) | dict.fromkeys(badly, 0.1 * FITS)
     theta = np.array([off])
-    fits = {label: Fit(label, (), theta, *[none] * 7, 0.0, likely[label]) for label in ("base", *effects)}
+    fits = {label: Fit(label, (), theta, *[none] * 8, 0.0, likely[label]) for label in ("base", *effects)}
     return Posterior(nothing, outside, effects, fits, (), 0.0)
 
 
