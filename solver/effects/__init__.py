@@ -1,8 +1,8 @@
 """Physical effects that the base model lacks: one file each, all off until an amplitude is set.
 
-To add one: a file with a frozen dataclass of ``ContactEffect``, ``BodyEffect`` or ``SetUpEffect`` (``effect.py``), and
-its two lines here, or an entry point ``effect.NAME`` of a package of one's own (``solver/plugins.py``). Files,
-``--set``, page, studies, diagnosis and the contract tests follow.
+To add one, write a file with a frozen dataclass of ``ContactEffect``, ``BodyEffect`` or ``SetUpEffect`` (``effect.py``)
+and add its import and its entry here, or declare an entry point ``effect.NAME`` in a package of your own
+(``solver/plugins.py``). Files, ``--set``, page, studies, diagnosis and the contract tests follow.
 """
 
 from solver.effects.adhesion_jkr import AdhesionJKR
@@ -47,17 +47,17 @@ EFFECTS: Registry[type[Effect]] = Registry(
 
 
 def contact_effects() -> tuple[type[ContactEffect], ...]:
-    """Those of contacts, in the order of their stages."""
+    """Effects on contacts, in the order of their stages."""
     return tuple(sorted((k for k in EFFECTS.values() if issubclass(k, ContactEffect)), key=lambda kind: kind.stage))
 
 
 def body_effects() -> tuple[type[BodyEffect], ...]:
-    """Those of bodies in flight."""
+    """Effects on moving bodies."""
     return tuple(kind for kind in EFFECTS.values() if issubclass(kind, BodyEffect))
 
 
 def set_up_effects() -> tuple[type[SetUpEffect], ...]:
-    """Those of material and set-up."""
+    """Effects that change material or set-up."""
     return tuple(kind for kind in EFFECTS.values() if issubclass(kind, SetUpEffect))
 
 

@@ -1,7 +1,7 @@
-"""Adhesion by surface forces (JKR; formulas in ``jkr_contact.py``), among bodies and with walls alike.
+"""Adhesion by surface forces (JKR; formulas in ``jkr_contact.py``), between bodies and with walls.
 
-Vanishes for a work of adhesion w → 0. The weight that one contact can hold is 3/2 π w R*, so it acts on small and light
-bodies first: Bo = 3/2 π w R*/(m g).
+Vanishes for a work of adhesion w → 0. One contact can hold a weight of 3/2 π w R*, so small and light bodies are
+affected most: Bond number Bo = 3/2 π w R*/(m g).
 Source: Johnson, Kendall & Roberts 1971, Proc. R. Soc. A 324:301. Some codes take the surface energy of one surface,
 γ = w/2 (LAMMPS, LIGGGHTS); EDEM and MercuryDPM take w.
 """
@@ -37,5 +37,5 @@ class AdhesionJKR(ContactEffect):
     act = staticmethod(stick)
 
     def grip(self, e_star: float, reduced_radius: float) -> float:
-        """Distance [m] at which surfaces part."""
+        """Gap [m] at which surfaces separate."""
         return grip(self.work_of_adhesion, e_star, reduced_radius)

@@ -1,10 +1,10 @@
-"""Simplified JKR adhesion: a pull in proportion to the contact area ("SJKR" of LIGGGHTS).
+"""Simplified JKR adhesion: a pull proportional to the contact area ("SJKR" of LIGGGHTS).
 
     F_n ← F_n − k A,   A = 2π R* δ        [N]
 
 k is the cohesion energy density [J/m³]. A is the area of the lens in which two spheres intersect, to first order in
-δ (LIGGGHTS takes the lens exactly: a difference of δ/(8 R*)). There is no pull at a gap. Vanishes for k → 0. Its
-effect is a softer contact that holds by k A at the overlap it rests at, so unlike JKR it grows with the load.
+δ (LIGGGHTS takes the lens exactly: a difference of δ/(8 R*)). There is no pull at a gap. Vanishes for k → 0. It makes
+the contact softer and holds it with k A at its overlap at rest, so unlike JKR's pull it grows with the load.
 Source: LIGGGHTS-PUBLIC documentation, "cohesion model sjkr".
 """
 

@@ -5,10 +5,11 @@
     a = exp(2.3288 − 6.4581 φ + 2.4486 φ²)                 b = 0.0964 + 0.5565 φ
     c = exp(4.905 − 13.8944 φ + 18.4222 φ² − 10.2599 φ³)   d = exp(1.4681 + 12.2584 φ − 20.7322 φ² + 15.8855 φ³)
 
-D is the diameter of the sphere of the same volume, φ the sphericity. C_D is by that sphere's area, so A is ¼ π D² on
-average over all directions of the wind, and goes with the area that the ellipsoid of the body's outer dimensions
-shows: φ π √((bc u₁)² + (ac u₂)² + (ab u₃)²) for a wind along u. The formula of C_D holds for isometric bodies, φ > 0.2,
-Re < 2.6·10⁵; no lift, no torque, no wake of others. The strength s scales the force, 1 is air; vanishes for s → 0.
+D is the diameter of the sphere of the same volume, φ the sphericity. C_D refers to that sphere's cross-section, so A is
+¼ π D² on average over all wind directions, and is proportional to the projected area of the ellipsoid with the body's
+outer dimensions: φ π √((bc u₁)² + (ac u₂)² + (ab u₃)²) for wind along u. The formula of C_D holds for isometric bodies,
+φ > 0.2, Re < 2.6·10⁵; there is no lift, no torque, no wake of others. The strength s scales the force, 1 is air;
+vanishes for s → 0.
 Source: Haider & Levenspiel 1989, Powder Technology 58:63.
 """
 
@@ -27,7 +28,7 @@ AIR_VISCOSITY = 1.825e-5
 
 @kernel_function
 def shape_factors(phi):
-    """a, b, c, d of a body of sphericity φ; they are worked out once, when it is loaded."""
+    """a, b, c, d of a body of sphericity φ; computed once, when the body is loaded."""
     a = ti.exp(2.3288 - 6.4581 * phi + 2.4486 * phi * phi)
     b = 0.0964 + 0.5565 * phi
     c = ti.exp(4.905 - 13.8944 * phi + 18.4222 * phi**2 - 10.2599 * phi**3)
@@ -37,14 +38,14 @@ def shape_factors(phi):
 
 @kernel_function
 def drag_coefficient(reynolds, factors):
-    """C_D of Haider & Levenspiel (1989); ``factors`` by :func:`shape_factors`."""
+    """C_D of Haider & Levenspiel (1989); ``factors`` from :func:`shape_factors`."""
     viscous = 24.0 / reynolds * (1.0 + factors[0] * reynolds ** factors[1])
     return viscous + factors[2] / (1.0 + factors[3] / reynolds)
 
 
 @kernel_function
 def shown_area(semi_axes, wind):
-    """Area [m²] that an ellipsoid shows to a ``wind`` along a unit vector of its principal frame."""
+    """Projected area [m²] of an ellipsoid along ``wind``, a unit vector in its principal frame."""
     x = semi_axes[1] * semi_axes[2] * wind[0]
     y = semi_axes[0] * semi_axes[2] * wind[1]
     z = semi_axes[0] * semi_axes[1] * wind[2]

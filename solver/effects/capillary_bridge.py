@@ -4,11 +4,11 @@
     at a gap s  F = 2π R γ cos θ / (1 + 2.1 S + 10 S²),   S = (s/2) √(R/V),   R = 2 R*
     breaks at   s_c = (1 + θ/2)(V*^⅓ + 0.1 V*^⅔) R,       V* = V/R³
 
-A bridge forms on touching and lasts until s_c (hysteresis). V is the volume of one bridge, θ the contact angle. The
-pull hardly depends on V; the amplitude is the surface tension γ. Vanishes for γ → 0.
+A bridge forms at contact and lasts up to the gap s_c (hysteresis). V is the volume of one bridge, θ the contact angle.
+The pull hardly depends on V; the amplitude is the surface tension γ. Vanishes for γ → 0.
 Source: Willett, Adams, Johnson & Seville 2000, Langmuir 16:9396, closed form and Eq. (15), as in YADE.
-Limits: no viscous part, no sharing of liquid, a sphere on a plane by Derjaguin's R = 2 R*, V* below 0.1; every member
-sphere of a clump that touches has a bridge of its own.
+Limits: no viscous force, no redistribution of liquid, a sphere on a plane by Derjaguin's R = 2 R*, V* below 0.1; every
+touching member sphere of a clump has its own bridge.
 """
 
 import math
@@ -26,7 +26,7 @@ def bridge(p, m, c):
     pull = 2.0 * math.pi * radius * p[0]
     held = 1
     if c.overlap < 0.0:
-        # s < s_c, solved for V*^⅓ so that no cube root is taken: v + 0.1 v² = s/((1 + θ/2) R), and v³ < V*.
+        # s < s_c, solved for V*^⅓ so that no cube root is needed: v + 0.1 v² = s/((1 + θ/2) R), and v³ < V*.
         needed = 5.0 * (ti.sqrt(1.0 - 0.4 * c.overlap / (p[2] * radius)) - 1.0) * radius
         s = -0.5 * c.overlap * ti.sqrt(radius / volume)
         pull /= 1.0 + 2.1 * s + 10.0 * s * s
@@ -68,7 +68,7 @@ class CapillaryBridge(ContactEffect):
         return wetting, self.bridge_volume, 1.0 + 0.5 * self.contact_angle
 
     def grip(self, e_star: float, reduced_radius: float) -> float:
-        """Distance [m] at which a bridge breaks."""
+        """Gap [m] at which a bridge breaks."""
         radius = 2.0 * reduced_radius
         share = (self.bridge_volume / radius**3) ** (1.0 / 3.0)
         return (1.0 + 0.5 * self.contact_angle) * (share + 0.1 * share**2) * radius

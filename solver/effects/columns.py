@@ -1,4 +1,4 @@
-"""Where the numbers of effects stand in the arrays of a batch: one table for NumPy and the kernels."""
+"""Columns of the effects' numbers in the arrays of a batch: one layout for NumPy and the kernels."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ CONTACT_EFFECTS, BODY_EFFECTS = contact_effects(), body_effects()
 KINDS: tuple[type[Effect], ...] = (*CONTACT_EFFECTS, *BODY_EFFECTS)
 WIDTHS = tuple(len(declared(kind, "")) for kind in KINDS)
 COLUMNS = (0, *accumulate(WIDTHS))
-"""First column of each effect's parameters, contact effects before body effects; the restitution stands in the last."""
+"""First column of each effect's parameters, contact effects before body effects; the last holds the restitution."""
 MEMORIES = tuple(kind.memory for kind in CONTACT_EFFECTS)
 MEMORY = (0, *accumulate(MEMORIES))
-"""First column of what each contact effect keeps of a contact; after them stand ``COUPLE`` and ``HERTZ``."""
+"""First column of what each contact effect keeps of a contact; ``COUPLE`` and ``HERTZ`` follow."""
 COUPLE = MEMORY[-1]
 """First of three columns: torque of the effects on the first body at the last step [N m], for the energy account."""
 HERTZ = COUPLE + 3
 """Contact radius without adhesion, √(R* δ), at the last step [m], for the energy account."""
 KEPT = HERTZ + 1
-"""Number of columns that a contact keeps."""
+"""Number of columns of a contact's memory."""
 
 
 def kernel_effects(scene: Scene) -> bool:
@@ -43,7 +43,7 @@ def kernel_effects(scene: Scene) -> bool:
 def effect_table(scene: Scene, walls: tuple[str, ...]) -> Array:
     """Parameters of the effects by contact class, shape (kinds, kinds, COLUMNS[-1] + 1): bodies, then wall materials.
 
-    Zeros for effects that are off, or do not act between two classes.
+    Zero for effects that are off or do not act between two classes.
     """
     n = len(scene.bodies)
     table = np.zeros((n + len(walls), n + len(walls), COLUMNS[-1] + 1))
@@ -68,8 +68,9 @@ def effect_table(scene: Scene, walls: tuple[str, ...]) -> Array:
 def reach_of_pulls(scene: Scene, walls: tuple[str, ...]) -> float:
     """Distance [m] beyond which no effect of ``scene`` holds two surfaces together.
 
-    A grip is monotonic in R* or falls and rises again, so the ends of the range of R* bound it: half the smallest
-    member sphere's radius and the largest's. Grips are added: two works of adhesion reach no further than that.
+    A grip is monotonic in R*, or falls and then rises, so its values at the ends of the range of R* bound it; the ends
+    are half the smallest member radius and the largest one. Grips are added, which also bounds two works of adhesion
+    that act together.
     """
     pulling = [effect for effect in scene.effects if effect.on and isinstance(effect, ContactEffect)]
     if not pulling:

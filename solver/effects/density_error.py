@@ -1,8 +1,8 @@
 """Bodies are heavier or lighter than declared, for instance by moisture.
 
-    ρ → (1 + x) ρ,   mass and inertia with it        the mass poured stays, so the number of bodies is 1/(1 + x) times
+    ρ → (1 + x) ρ,   mass and inertia in proportion;   the poured mass is kept, with 1/(1 + x) times as many bodies
 
-Vanishes for x → 0. At x = M − M₀ a moisture content (dry basis) of M instead of M₀ without swelling.
+Vanishes for x → 0. x = M − M₀ represents a moisture content (dry basis) of M instead of M₀ without swelling.
 """
 
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ class DensityError(SetUpEffect):
     telltales = (Telltale.PACKING,)
 
     def applied(self, scene: Any) -> Any:
-        """``scene`` with the density of all materials that bodies are made of changed."""
+        """``scene`` with a changed density of all materials of which bodies are made."""
         factor = 1.0 + self.excess
         made_of = {body.material for body in scene.bodies}
         materials = tuple(

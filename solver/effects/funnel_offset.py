@@ -1,9 +1,9 @@
-"""The funnel does not stand over the point of the plate from which the pile is measured.
+"""The funnel is not centred over the point of the plate from which the pile is measured.
 
     measured position = true position + (dx, dy)
 
-Plate and gravity are the same everywhere, so the pile of a displaced funnel is the same pile, displaced: exact, but for
-the edge of the domain, which stays centred on the funnel. Vanishes for both → 0.
+Plate and gravity are the same everywhere, so the pile of a displaced funnel is the same pile, displaced. This is exact
+except for the edge of the domain, which stays centred on the funnel. Vanishes for both → 0.
 """
 
 from dataclasses import dataclass, replace

@@ -1,8 +1,8 @@
 """Functions for kernels in modules that are imported without Taichi.
 
-Scenes, sliders and files need an effect's parameters; only the solver's process has Taichi. ``ti`` here is Taichi once
-something of it is used, and ``kernel_function`` is ``ti.func`` from the first call on, which a kernel makes.
-Arguments are passed by value: a law returns what it changes.
+Scenes, sliders and files need an effect's parameters; only the solver's process has Taichi. ``ti`` here imports Taichi
+when an attribute of it is first used, and ``kernel_function`` applies ``ti.func`` at the first call, which a kernel
+makes. Arguments are passed by value: a function returns what it changes.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ ti: Any = _Taichi()
 class KernelFunction:
     """A function that kernels may call."""
 
-    # What Taichi asks of a callable before it compiles a call to it.
+    # Taichi reads these attributes of a callable before it compiles a call to it.
     _is_taichi_function = True
     _is_real_function = False
 
@@ -33,12 +33,12 @@ class KernelFunction:
 
     @cached_property
     def compiled(self) -> Callable[..., Any]:
-        """The same as ``ti.func`` makes it."""
+        """The function as ``ti.func`` makes it."""
         return ti.func(self.body)
 
     @property
     def func(self) -> Any:
-        """Taichi's own object, which it asks for after a call."""
+        """Taichi's own object for the function, which Taichi reads after a call."""
         return self.compiled.func  # type: ignore[attr-defined]
 
     def __call__(self, *args: Any) -> Any:

@@ -3,7 +3,7 @@
     μ(v) = μ_s [1 − d (1 − exp(−|v_t|/v_c))]        μ_k = (1 − d) μ_s
 
 v_c is the speed of the transition. Vanishes for a drop d → 0. On an inclined plane a body starts to slide at tan⁻¹ μ_s
-and, once it slides, goes on down to tan⁻¹ μ_k.
+and, once it slides, keeps sliding down to tan⁻¹ μ_k.
 Source: exponential form of Bo & Pavelescu 1982, Wear 82:277 (in LAMMPS- and Abaqus-type codes "exponential decay").
 """
 

@@ -4,13 +4,15 @@
     unloading   F = k/(1 − λ) (δ^{3/2} − λ δ_max^{3/2}) ≥ 0
 
 λ = 1 − k/k₂ is the plasticity; δ_max the largest overlap of this contact, forgotten when the surfaces part. Vanishes
-for λ → 0. The force ends at δ = λ^{2/3} δ_max, so that of the energy put in, 2/5 k δ_max^{5/2}, without other damping
+for λ → 0. The force ends at δ = λ^{2/3} δ_max. Without other damping, the share of the energy put in,
+2/5 k δ_max^{5/2}, that is recovered is
 
     e² = (1 − 5/2 λ + 3/2 λ^{5/3})/(1 − λ)
 
-comes back, at any speed (with forces linear in δ it would be 1 − λ): e = 0.82, 0.67, 0.42 for λ = 0.25, 0.5, 0.8.
-Unloading is 1/(1 − λ) times as stiff, but takes no shorter step: where the branches meet the force is continuous, and
-less energy comes back through fewer steps. Impacts are as exact as without the effect (``tests/solver/effects``).
+at any speed (with forces linear in δ it would be 1 − λ): e = 0.82, 0.67, 0.42 for λ = 0.25, 0.5, 0.8.
+Unloading is 1/(1 − λ) times as stiff, but needs no shorter time step: the force is continuous where the branches meet,
+and unloading takes fewer steps but also returns less energy. Impacts are as exact as without the effect
+(``tests/solver/effects``).
 Source: Walton & Braun 1986, Journal of Rheology 30:949; the exponent 3/2 and λ as in the Edinburgh elasto-plastic
 adhesion model (Morrissey 2013, thesis, Edinburgh), without its adhesive branch.
 """

@@ -1,9 +1,9 @@
-"""Plate and funnel stand aslant: gravity is turned relative to both.
+"""Plate and funnel are tilted: gravity is rotated relative to both.
 
-    g → R g,   R turns by √(tilt_x² + tilt_y²) so that the plate slopes down by tilt_x along +x and tilt_y along +y
+    g → R g,   R rotates by √(tilt_x² + tilt_y²) so that the plate slopes down by tilt_x along +x and tilt_y along +y
 
 Vanishes for both → 0. The pile leans: its centre of mass moves downhill, and the flank on that side is flatter as seen
-from the plate. The mean of all azimuths changes in second order only.
+from the plate. The mean over all azimuths changes only to second order.
 """
 
 import math
@@ -30,7 +30,7 @@ class PlateTilt(SetUpEffect):
     telltales = (Telltale.ASYMMETRY,)
 
     def applied(self, scene: Any) -> Any:
-        """``scene`` with gravity turned."""
+        """``scene`` with gravity rotated."""
         angle = math.radians(math.hypot(self.tilt_x, self.tilt_y))
         if angle == 0.0:
             return scene

@@ -1,15 +1,15 @@
 """Rolling resistance: an elastic–plastic torque against rolling (EPSD2 of LIGGGHTS, "type C" of Ai et al.).
 
-    torque spring   T ← T − k_r ω_r dt,  turned with the normal, capped at μ_r R* F_n       [N m]
+    torque spring   T ← T − k_r ω_r dt,  rotated with the normal, capped at μ_r R* F_n      [N m]
     stiffness       k_r = k_t R*²,  k_t = 8 G* a                                            [N m/rad]
     dashpot         −η_r 2 √(I k_r) ω_r while the spring is not at its cap, I = m* R*²       (0 by default)
 
-ω_r is the relative angular velocity across the normal. Vanishes for μ_r → 0. A sphere on a slope then holds up to
-tan⁻¹ μ_r, and rolls with an acceleration lowered by μ_r g cos α beyond.
+ω_r is the part of the relative angular velocity perpendicular to the normal. Vanishes for μ_r → 0. A sphere rests on a
+slope up to the angle tan⁻¹ μ_r; on a steeper slope α it rolls with an acceleration lowered by μ_r g cos α.
 Source: Ai, Chen, Rotter & Ooi 2011, Powder Technology 206:269; LIGGGHTS-PUBLIC `rolling_model_epsd2.h`. On member
-spheres of clumps it stands for what their shape lacks: edges and roughness finer than a sphere.
+spheres of clumps it represents what their shape lacks: edges, and roughness finer than a sphere.
 
-Springs that a contact carries along: turned with its normal, capped in length.
+:func:`turned_with` and :func:`capped` rotate the spring of a contact with its normal and limit its length.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from solver.params import param
 
 @kernel_function
 def turned_with(spring, n):
-    """``spring`` laid into the plane across the new normal ``n``, with its length kept."""
+    """``spring`` projected onto the plane perpendicular to the new normal ``n``, its length kept."""
     flat = spring - spring.dot(n) * n
     length2, flat2 = spring.dot(spring), flat.dot(flat)
     scale = 0.0

@@ -2,9 +2,10 @@
 
     x → (1 + ε) x,   y, z → y, z/√(1 + ε)        along the principal axes, x the longest
 
-A cylinder wider than long gets the wider for it: d → (1 + ε) d, l → l/(1 + ε)².
-A solid's dimensions change so; of a body that is declared by spheres the centres move and the radii stay. Vanishes for
-ε → 0. Inertia follows the dimensions: those of a solid anew, those of spheres by the second moments of the stretch.
+A cylinder that is wider than long becomes wider: d → (1 + ε) d, l → l/(1 + ε)².
+The dimensions of a solid change in this way; in a body that is declared by spheres, the centres move and the radii stay
+the same. Vanishes for ε → 0. The inertia of a solid is computed anew from its dimensions, that of a body of spheres
+from its stretched second moments.
 """
 
 from dataclasses import dataclass, replace

@@ -2,7 +2,7 @@
 
     s ~ log-normal, E[s] = 1, standard deviation σ        (``solver/scenes/sizes.py``)
 
-Vanishes for σ → 0. The mass poured stays, so the number of bodies falls by E[s³] = 1 + 3 σ² + ….
+Vanishes for σ → 0. The poured mass is kept, so the number of bodies falls by the factor E[s³] = 1 + 3 σ² + ….
 Source: log-normal sizes of comminuted and natural grains, e.g. Allen 1997, Particle Size Measurement.
 """
 
@@ -28,7 +28,7 @@ class SizeDispersion(SetUpEffect):
     telltales = (Telltale.PACKING,)
 
     def applied(self, scene: Any) -> Any:
-        """``scene`` with the spread added, in squares, to that of every component."""
+        """``scene`` with the spread added in quadrature to that of every component."""
         if self.spread == 0.0:
             return scene
 

@@ -1,9 +1,9 @@
-"""Twisting resistance: a torque against turning about the contact normal (Marshall).
+"""Twisting resistance: a torque against rotation about the contact normal (Marshall).
 
     spring   T ← T − k_w (ω·n) dt,  k_w = ½ k_t a² = 4 G* a³,  capped at ⅔ a μ F_n          [N m]
     torque   T − ½ η_t a² (ω·n),  within the same cap        η_t: the tangential dashpot of the contact law [kg/s]
 
-The cap is the torque of Coulomb friction over a Hertzian contact area, for s = 1; the model has no free parameter, so
+For s = 1, the cap is the torque of Coulomb friction over a Hertzian contact area. The model has no free parameter, so
 its ``strength`` s scales stiffness, damping and cap together. Vanishes for s → 0.
 Source: Marshall 2009, Journal of Computational Physics 228:1541; LAMMPS `pair granular`, twisting "marshall".
 """
@@ -29,7 +29,7 @@ def twisting_torque(p, m, c):
 
 @dataclass(frozen=True)
 class Twisting(ContactEffect):
-    """Resistance against turning about the normal; ``strength`` is the amplitude."""
+    """Resistance to rotation about the normal; ``strength`` is the amplitude."""
 
     strength: float = param(0.0, low=0.0, high=10.0, doc="Strength s; 1 is Coulomb friction over the area.", live=True)
 

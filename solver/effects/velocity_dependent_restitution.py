@@ -1,11 +1,11 @@
-"""Restitution that falls with the speed of impact, as of viscoelastic spheres.
+"""Restitution that falls with impact speed, as for viscoelastic spheres.
 
     1 − e(v) = (1 − e) [1 + q ((v/v₀)^{1/5} − 1)]           v: speed at which the contact began
 
-e is the declared restitution, taken to hold at v₀ = 1 m/s; q = 1 is the law of viscoelastic spheres to leading order,
-vanishes for q → 0. The damper of a contact is that of e(v), kept within 0.05 … 1, by the exact inverse of
-``laws/restitution.py`` as a series. A contact that stood when the effect was switched on keeps its damper; one that
-began slowly keeps a weak one, however hard it is hit later.
+e is the declared restitution, taken to hold at v₀ = 1 m/s; q = 1 is the law of viscoelastic spheres to leading order.
+Vanishes for q → 0. The damper of a contact is that for e(v), limited to 0.05 … 1, from a series of the exact inverse
+in ``laws/restitution.py``. A contact that existed when the effect was switched on keeps its damper; one that began
+slowly keeps a weak damper, however hard it is hit later.
 Source: Brilliantov, Spahn, Hertzsch & Pöschel 1996, Physical Review E 53:5382; Schwager & Pöschel 1998, PRE 57:650.
 """
 
@@ -22,7 +22,7 @@ from solver.params import param
 
 DEGREE = 20
 LEAST = 0.05
-"""Restitution that no speed takes a contact below."""
+"""Lower limit of the restitution at any speed."""
 
 
 def _series() -> tuple[float, ...]:
@@ -47,7 +47,7 @@ def damping_of(restitution):
 
 @kernel_function
 def damp_by_speed(p, m, c):
-    """p: q, v₀; m: by how much the damper is off from that of e, as a fraction; found when the contact began."""
+    """p: q, v₀; m: relative difference of the damper from that for e, set when the contact begins."""
     if c.before == 0.0:
         speed = ti.max(1e-4, -c.v_n) / p[1]
         loss = (1.0 - c.restitution) * (1.0 + p[0] * (speed**0.2 - 1.0))

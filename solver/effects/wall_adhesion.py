@@ -1,8 +1,8 @@
 """Adhesion to the walls only (JKR; formulas in ``jkr_contact.py``): sticky or charged surfaces, clean bodies.
 
-    F = F_JKR(δ; w + w')  at walls,  F_JKR(δ; w') among bodies       w': that of ``adhesion_jkr``
+    F = F_JKR(δ; w + w')  at walls,  F_JKR(δ; w') between bodies     w': that of ``adhesion_jkr``
 
-Vanishes for a work of adhesion w → 0. Bodies stay on the funnel's wall, and the pile's foot is held.
+Vanishes for a work of adhesion w → 0. Bodies stick to the funnel's wall, and the foot of the pile is held.
 Source: as ``adhesion_jkr``.
 """
 
@@ -43,5 +43,5 @@ class WallAdhesion(ContactEffect):
         return self.numbers if at_wall else (0.0,)
 
     def grip(self, e_star: float, reduced_radius: float) -> float:
-        """Distance [m] at which surfaces part."""
+        """Gap [m] at which surfaces separate."""
         return grip(self.work_of_adhesion, e_star, reduced_radius)

@@ -1,1 +1,1 @@
-"""The running batch: the arrays of its worlds, the kernels that move them, and ways to keep and restore one."""
+"""The running batch: the arrays of its worlds, the kernels that advance them, and ways to save and restore a world."""

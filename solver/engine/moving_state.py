@@ -1,7 +1,7 @@
-"""What moves in a world as one row of numbers: the quick sibling of ``solver/engine/snapshot.py``.
+"""What changes in a running world, as one row of numbers: a faster alternative to ``solver/engine/snapshot.py``.
 
-A row goes back into the slot that it was taken from, in a batch of the same capacity; what was loaded once and never
-changes (masses, shapes, surfaces) is not in it. Whole numbers of 32 bits are exact in double precision.
+A row can be restored only to the slot from which it was taken, in a batch of the same capacity; what is loaded once and
+never changes (masses, shapes, surfaces) is not in it. Integers of 32 bits are exact in double precision.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ LOADED_ONCE = frozenset(
         *("swing", "first", "members", "kind", "local", "radius", "body"),
     )
 )
-"""Fields of bodies and members that only loading a scene writes."""
+"""Fields of bodies and members that are written only when a scene is loaded."""
 SCRATCH = frozenset(("near", "next"))
-"""Fields of bodies that building the contact list fills before it reads them."""
+"""Fields of bodies that the list build fills before it reads them."""
 
 
 @dataclass(frozen=True)
 class Moving:
-    """One world at one moment."""
+    """Changing state of one world at one time."""
 
     bodies: int
     """Bodies that will enter."""
     members: int
     """Their member spheres."""
     world: Array
-    """What the world has once."""
+    """Fields that exist once per world."""
     row: Array
-    """Bodies, members, contacts, walls, candidates, and what effects keep of contacts if there are any."""
+    """Bodies, members, contacts, walls, candidates, and the effects' memory of contacts if ``effects``."""
     effects: bool
 
     @property
@@ -63,7 +63,7 @@ class _Section:
 
 
 def take(state: Any, w: int, bodies: int, members: int) -> Moving:
-    """What moves in world ``w``, for which ``bodies`` with ``members`` spheres in all have been loaded."""
+    """Changing state of world ``w``, for which ``bodies`` bodies with ``members`` spheres in total have been loaded."""
     once = _world_fields(state)
     world = np.empty(_width(once))
     transfer.pack_world(once, w, world)
@@ -79,7 +79,7 @@ def take(state: Any, w: int, bodies: int, members: int) -> Moving:
 
 
 def put(state: Any, w: int, kept: Moving) -> None:
-    """Bring world ``w`` back to what :func:`take` found in it."""
+    """Restore world ``w`` to the state that :func:`take` saved."""
     transfer.unpack_world(_world_fields(state), w, kept.world)
     sections = _sections(state, kept.world, kept.bodies, kept.members)
     for section in sections:
@@ -89,12 +89,12 @@ def put(state: Any, w: int, kept: Moving) -> None:
         row = kept.row if kept.effects else np.append(kept.row, _memory_without_effects(state, kept.row, sections[2]))
         transfer.unpack_memory(state.memory.number, w, contacts, end, row)
     if state.sharing:
-        # Which entries belong to one pair is found out when the list is built.
+        # The list build determines which entries belong to one pair.
         state.world.outdated[w] = 1
 
 
 def _memory_without_effects(state: Any, row: Array, contacts: _Section) -> Array:
-    """What effects keep of contacts that they have not seen yet: contact radii are those of Hertz."""
+    """Effects' memory of contacts saved without effects: zero except for the contact radii, which are Hertz's."""
     table = row[contacts.first : contacts.end].reshape(contacts.entries, contacts.width)
     before = tuple(CONTACT)[: tuple(CONTACT).index("radius")]
     memory = np.zeros((contacts.entries, state.memory.number.shape[2]))
@@ -102,13 +102,13 @@ def _memory_without_effects(state: Any, row: Array, contacts: _Section) -> Array
     return memory.ravel()
 
 
-@cache  # The kernels are compiled anew for every tuple, so there must be one of each; a batch's arrays stay for ever.
+@cache  # Kernels are compiled anew for every tuple, so each tuple is made once; the arrays of a batch are never freed.
 def _world_fields(state: Any) -> tuple[Any, ...]:
     return tuple(getattr(state.world, name) for name in WORLD)
 
 
 def _sections(state: Any, world: Array, bodies: int, members: int) -> list[_Section]:
-    """Bodies, members, contacts, walls and candidates one after the other; ``world`` tells how many are in use."""
+    """Bodies, members, contacts, walls and candidates, in this order; ``world`` contains how many are in use."""
     contacts, walls, candidates = (
         int(world[_world_column(state, name)]) for name in ("contacts", "walls", "candidates")
     )
@@ -141,5 +141,5 @@ def _world_column(state: Any, name: str) -> int:
 
 
 def _width(fields: tuple[Any, ...]) -> int:
-    """Numbers that one entry of ``fields`` takes."""
+    """Number of columns that one entry of ``fields`` takes."""
     return sum(getattr(field, "n", 1) * getattr(field, "m", 1) for field in fields)

@@ -1,6 +1,6 @@
-"""One world as plain arrays, to be kept and put back: a run that goes on from a snapshot gives the same bits.
+"""One world as plain arrays, to save and restore: a run continued from a snapshot gives the same bits.
 
-A snapshot belongs to no place: it can be put into any slot of a batch with room for it.
+A snapshot is not tied to a slot: it can be put into any slot of a batch with room for it.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from solver.engine.state import BODY, CONTACT, MEMBER, WALL, WORLD
 Arrays = dict[str, npt.NDArray[Any]]
 
 TABLES = {"world": WORLD, "body": BODY, "member": MEMBER, "contact": CONTACT, "wall": WALL}
-"""Groups that a snapshot holds; what is not here follows from the scene and is loaded from it."""
+"""Groups that a snapshot contains; what is not listed follows from the scene and is loaded from it."""
 
 
 def take(state: Any, w: int) -> Arrays:
-    """Arrays of world ``w``, cut to what is in use: ``"body.position"`` has shape (bodies, 3)."""
+    """Arrays of world ``w``, truncated to the entries in use: ``"body.position"`` has shape (bodies, 3)."""
     used = _used(state, w)
     found: Arrays = {}
     for group, table in TABLES.items():
@@ -30,20 +30,20 @@ def take(state: Any, w: int) -> Arrays:
     if state.effects:
         found["memory.number"] = state.memory.number.to_numpy()[w][: used["contact"]].copy()
     found["candidate.triangle"] = state.candidate.triangle.to_numpy()[w][: used["candidate"]].copy()
-    # Surfaces are numbered after the members' capacity; free the numbers of it.
+    # Surfaces are numbered from the members' capacity on; make the numbers independent of it.
     partner, room = found["contact.j"], state.member.body.shape[1]
     found["contact.j"] = np.where(partner >= room, room - 1 - partner, partner)
     return found
 
 
 def put(state: Any, w: int, arrays: Arrays) -> None:
-    """Replace world ``w``, which has been loaded with the same scene, by what :func:`take` gave.
+    """Replace world ``w``, which has been loaded with the same scene, by the arrays that :func:`take` returned.
 
     Raises ValueError if the batch has no room for it.
     """
     room = state.member.body.shape[1]
     if state.effects and "memory.number" not in arrays:
-        # From a batch without effects: they keep nothing of its contacts yet, and contact radii are those of Hertz.
+        # From a batch without effects: there is no memory of its contacts yet, and contact radii are Hertz's.
         memory = np.zeros((len(arrays["contact.radius"]), state.memory.number.shape[2]))
         memory[:, HERTZ] = arrays["contact.radius"]
         arrays = arrays | {"memory.number": memory}
@@ -61,7 +61,7 @@ def put(state: Any, w: int, arrays: Arrays) -> None:
             whole[w, : len(kept)] = np.where(kept < 0, room - 1 - kept, kept) if key == "contact.j" else kept
         field.from_numpy(whole)
     if state.sharing:
-        # Which entries belong to one pair is found out when the list is built.
+        # The list build determines which entries belong to one pair.
         state.world.outdated[w] = 1
 
 

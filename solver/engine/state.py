@@ -20,7 +20,7 @@ Mat3 = ti.types.matrix(3, 3, ti.f64)
 WORLD = {
     "dt": ti.f64,  # time step [s]
     "gravity": Vec3,  # [m/s²]
-    "skin": ti.f64,  # reach of the contact list beyond touching, which margins are measured in [m]
+    "skin": ti.f64,  # unit of the margins, by which the contact list reaches beyond touching [m]
     "outdated": ti.i32,  # 1: the list has to be built before the next step
     "loaded": ti.i32,  # bodies that will enter
     "bodies": ti.i32,  # bodies that have entered
@@ -34,19 +34,19 @@ WORLD = {
     "cell": ti.f64,  # edge of a cell of the body grid [m]
     "kinds": ti.i32,  # contact classes
     "sleep_speed": ti.f64,  # a body slower than this may fall asleep [m/s]; 0: none does
-    "sleep_time": ti.f64,  # once it has been so slow for this long [s]
-    "stirred": ti.i32,  # 1: who is awake has changed, or the list was built
+    "sleep_time": ti.f64,  # after it has been that slow for this time [s]
+    "stirred": ti.i32,  # 1: a body woke or fell asleep, or the list was built
     "awake": ti.i32,  # bodies that move
-    "border": ti.i32,  # sleepers that something awake may push
+    "border": ti.i32,  # sleeping bodies that an awake body or a moving wall may push
     "live": ti.i32,  # entries of the list whose force may change
-    "dissipated": ti.f64,  # energy that contacts and falling asleep have taken [J]
+    "dissipated": ti.f64,  # energy dissipated by contacts and by falling asleep [J]
     "wall_work": ti.f64,  # work of moving walls and of a pull on the bodies [J]
     "taken_out": ti.f64,  # kinetic and potential energy of bodies that were taken out [J]
     "domain": ti.f64,  # bodies beyond |x| or |y| of this are taken out [m]
-    "grip": ti.f64,  # distance at which effects may still hold surfaces that have touched [m]
-    "clump_rule": ti.i32,  # place in ``contact_model.CLUMP_RULES``
-    "tangential_law": ti.i32,  # place in ``contact_model.TANGENTIAL_LAWS``
-    "tangential_dashpot": ti.i32,  # place in ``contact_model.TANGENTIAL_DASHPOTS``
+    "grip": ti.f64,  # largest gap at which effects may still hold surfaces that have touched [m]
+    "clump_rule": ti.i32,  # index in ``contact_model.CLUMP_RULES``
+    "tangential_law": ti.i32,  # index in ``contact_model.TANGENTIAL_LAWS``
+    "tangential_dashpot": ti.i32,  # index in ``contact_model.TANGENTIAL_DASHPOTS``
     "outlet": ti.f64,  # height of the outlet [m]
     "inlet_radius": ti.f64,  # radius of the feed opening [m]
 }
@@ -66,12 +66,12 @@ BODY = {
     "force": Vec3,  # contact force [N]
     "torque": Vec3,  # contact torque about the centre of mass, world frame [N m]
     "reach": ti.f64,  # radius of the bounding sphere [m]
-    "semi_axes": Vec3,  # of the ellipsoid that stands for the body in the wind [m], `tables.outline`
+    "semi_axes": Vec3,  # of the ellipsoid that represents the body in air drag [m], `tables.outline`
     "diameter": ti.f64,  # of the sphere of the same volume [m]
     "drag_factors": Vec4,  # a, b, c, d of its drag coefficient (`effects/air_drag.py`)
     "swing": ti.f64,  # largest distance of a member's centre from the centre of mass [m]
-    "travel": ti.f64,  # bound on the motion of any of its members' centres since the list was built [m]
-    "margin": ti.f64,  # how far that may be while the list holds [m]
+    "travel": ti.f64,  # bound on the displacement of its members' centres since the list was built [m]
+    "margin": ti.f64,  # largest travel for which the list remains valid [m]
     "first": ti.i32,  # index of the first member sphere
     "members": ti.i32,  # number of member spheres
     "kind": ti.i32,  # contact class
@@ -86,9 +86,9 @@ BODY = {
     "quiet": ti.f64,  # how long it has been slower than ``sleep_speed`` [s]
     "asleep": ti.i32,  # 1: stands still until the forces on it change
     "held": Vec3,  # force [N] and
-    "held_torque": Vec3,  # torque [N m] on a sleeper from contacts in which nothing moves
+    "held_torque": Vec3,  # torque [N m] on a sleeping body from contacts in which nothing moves
     "awake": ti.i32,  # list of the bodies that move, ascending
-    "border": ti.i32,  # list of the sleepers that something awake may push, ascending
+    "border": ti.i32,  # list of the sleeping bodies that an awake body or a moving wall may push, ascending
     "at_border": ti.i32,  # 1: is in that list
 }
 """Per body, shape (worlds, bodies)."""
@@ -103,10 +103,10 @@ MEMBER = {
 """Per member sphere, shape (worlds, members)."""
 
 PULL = {"body": ti.i32, "force": Vec3}
-"""The body that a person pulls, its number + 1 (0: none), and the force on its centre of mass [N]; per world."""
+"""Per world: number + 1 of the body that a person pulls (0: none), and the force on its centre of mass [N]."""
 
 HISTORY = {"i": ti.i32, "j": ti.i32, "spring": Vec3, "loss": Vec3, "radius": ti.f64, "expected": ti.f64}
-"""What a contact keeps when the list is built again, shape (worlds, contacts)."""
+"""What a contact keeps when the list is rebuilt, shape (worlds, contacts)."""
 
 CONTACT = {
     "i": ti.i32,  # member sphere
@@ -117,12 +117,12 @@ CONTACT = {
     "reduced_radius": ti.f64,  # R* = r_i r_j / (r_i + r_j), r_i against a surface [m]
     "reduced_mass": ti.f64,  # m* of the bodies, m_i against a surface [kg]
     "spring": Vec3,  # tangential elastic force on i [N]
-    "loss": Vec3,  # the part of the force at the last step that takes energy, on j [N]
+    "loss": Vec3,  # force on j at the last step other than the elastic normal force: damping and friction [N]
     "radius": ti.f64,  # contact radius a = sqrt(R* δ) at the last step [m]; 0: apart
     "expected": ti.f64,  # speed along the normal [m/s] after the last step if this contact alone had acted
     "first": ti.i32,  # first of the triangles that may touch, for a patch of a mesh
     "triangles": ti.i32,  # and how many
-    "live": ti.i32,  # list of the entries that have a body awake or a moving wall, ascending; then the others
+    "live": ti.i32,  # list of the entries that have an awake body or a moving wall, ascending; then the others
 }
 """Per entry of the contact list, ordered by (i, j), shape (worlds, contacts)."""
 
@@ -130,30 +130,30 @@ PAIR = {
     "lead": ti.i32,  # first entry of the list with the same two bodies (or body and wall)
     "overlap": ti.f64,  # at a lead: sum of the overlaps δ of all contacts of the pair [m]
     "normal": Vec3,  # at a lead: sum of δ n [m]
-    "point": Vec3,  # at a lead: sum of δ times the contact's place relative to the first body's centre [m²]
+    "point": Vec3,  # at a lead: sum of δ times the contact point relative to the centre of body a [m²]
 }
-"""Per entry of the contact list where contacts of a pair share (``narrowphase.py``), shape (worlds, contacts)."""
+"""Per entry of the contact list if contacts of a pair share (``narrowphase.py``), shape (worlds, contacts)."""
 
 WALL = {
     "origin": Vec3,  # pose: local frame → world [m]
     "quaternion": Vec4,
-    "turn": Mat3,  # the same as a matrix
+    "turn": Mat3,  # the same rotation as a matrix
     "velocity": Vec3,  # of the origin [m/s]
     "omega": Vec3,  # angular velocity about the origin, world frame [rad/s]
     "moving": ti.i32,  # 1: the velocities are not zero
-    "extent": ti.f64,  # distance of its furthest point from the origin that a turn displaces [m]
-    "travel": ti.f64,  # bound on the motion of any of its points since the list was built [m]
-    "margin": ti.f64,  # how far that may be while the list holds [m]
+    "extent": ti.f64,  # distance from the origin to the furthest point that the rotation displaces [m]
+    "travel": ti.f64,  # bound on the displacement of its points since the list was built [m]
+    "margin": ti.f64,  # largest travel for which the list remains valid [m]
     "kind": ti.i32,  # contact class
     "active": ti.i32,
     "force": Vec3,  # force of the bodies on the wall at the last step [N]
     "torque": Vec3,  # torque about the origin [N m]
-    "held": Vec3,  # the parts of both that contacts make in which nothing moves
+    "held": Vec3,  # parts of force and torque from contacts in which nothing moves
     "held_torque": Vec3,
     "low": Vec3,  # lower corner of a mesh's grid, local frame [m]
     "cell": ti.f64,  # edge of its cells [m]; 0: no mesh
     "cells": Ints3,  # number of cells along each axis
-    "first_cell": ti.i32,  # where its cells begin
+    "first_cell": ti.i32,  # index of its first cell
 }
 """Per surface of the rig as declared, shape (worlds, walls)."""
 
@@ -162,7 +162,7 @@ SURFACE = {
     "geometry": Vec4,  # of a revolved segment: r0, z0, r1, z1 [m]
     "wall": ti.i32,
 }
-"""What a sphere can touch: a primitive is one, a mesh one per smooth patch; shape (worlds, surfaces)."""
+"""What a sphere can touch: one entry per primitive, and one per smooth patch of a mesh; shape (worlds, surfaces)."""
 
 TRIANGLE = {
     "a": Vec3,  # corners in the frame of the wall [m]
@@ -171,7 +171,7 @@ TRIANGLE = {
     "surface": ti.i32,
     "edges": Ints3,  # what to do with a nearest point on ab, bc, ca: 0 keep, 1 leave it to the other patch, 2 see guard
     "corners": Ints3,  # the same at a, b, c: 0 keep, 1 leave it to the other patch
-    "guards": Mat3,  # row per edge: unit vector in the neighbour's plane, away from the edge
+    "guards": Mat3,  # one row per edge: unit vector in the neighbour's plane, away from the edge
 }
 """Per triangle of the meshes, ordered by surface, shape (worlds, triangles)."""
 
@@ -180,21 +180,21 @@ SUMMARY = {
     "elastic": ti.f64,  # energy in the contact springs [J]
     "potential": ti.f64,  # − m g·x [J]
     "speed": ti.f64,  # largest √(2 kinetic / mass) of the bodies outside the funnel that do not roll away [m/s]
-    "funnel_speed": ti.f64,  # the same of the bodies in the funnel [m/s]
+    "funnel_speed": ti.f64,  # the same for the bodies in the funnel [m/s]
     "discharged": ti.f64,  # mass below the outlet or taken out [kg]
     "in_funnel": ti.f64,  # mass above the outlet [kg]
     "touching": ti.i32,  # touching contacts
     "hanging": ti.i32,  # bodies above the outlet
-    "asleep": ti.i32,  # bodies that sleep
+    "asleep": ti.i32,  # sleeping bodies
     "finite": ti.i32,  # 0 once a number is not finite
 }
 """Per world, written by the kernel at the end of a launch, shape (worlds,)."""
 
 QUANTA = {"bodies": 128, "members": 1024, "contacts": 16384}
 MESH_QUANTA = {"triangles": 256, "cells": 4096, "cell_items": 16384}
-"""What a size is a multiple of, so that scenes much alike share the kernels that are compiled for it."""
+"""Sizes are rounded up to multiples of these, so that similar scenes share compiled kernels."""
 KINDS = 6
-"""Contact classes of the smallest table; a larger one has twice as many, or four times."""
+"""Contact classes of the smallest table; larger ones have twice as many, four times as many, and so on."""
 
 
 @dataclass(frozen=True)
@@ -210,25 +210,25 @@ class Capacity:
     surfaces: int = 8
     triangles: int = 1
     effects: bool = False
-    """Whether effects are compiled in: the base model is faster without."""
+    """Whether effects are compiled in: the base model is faster without them."""
     sharing: bool = False
-    """Whether the rule is compiled in by which contacts of a pair of clumps share."""
+    """Whether the clump rule by which contacts of a pair share stiffness and damping is compiled in."""
     law: str = HertzMindlin.name
     """The contact law that is compiled in."""
     cells: int = 1
-    """Cells of all meshes' grids, and one more."""
+    """Cells of the grids of all meshes, plus one."""
     cell_items: int = 1
     """Triangles in those cells, counted once per cell."""
 
     def rounded(self) -> "Capacity":
-        """Sizes rounded up to multiples of their quanta; where there is no mesh, none is made room for."""
+        """Sizes rounded up to multiples of their quanta; sizes of mesh tables only if there is a mesh."""
         quanta = QUANTA | (MESH_QUANTA if self.triangles > 1 else {})
         kinds = KINDS * 2 ** math.ceil(math.log2(max(1.0, self.kinds / KINDS)))
         sizes = {name: -(-getattr(self, name) // unit) * unit for name, unit in quanta.items()}
         return replace(self, kinds=kinds, **sizes)
 
     def joined(self, other: "Capacity") -> "Capacity":
-        """The least that holds what either holds."""
+        """Smallest capacity that is large enough for both."""
         return Capacity(
             **{field.name: max(getattr(self, field.name), getattr(other, field.name)) for field in fields(self)}
         )
@@ -255,7 +255,7 @@ class Group:
 
 @ti.data_oriented
 class State:
-    """All arrays of a batch. Taichi never frees fields, so batches of one capacity share them (:func:`state`)."""
+    """All arrays of a batch. Taichi never frees fields, so batches of equal capacity share them (:func:`state`)."""
 
     owner: object = None
     """The batch that uses the arrays at present."""
@@ -279,7 +279,7 @@ class State:
         self.contact_law = CONTACT_LAWS[c.law]
         self.law_row = ti.types.struct(**dict.fromkeys(self.contact_law.columns, ti.f64))
         self.law = Group({"row": self.law_row}, (c.worlds, c.kinds * c.kinds))
-        # Parameters of effects by contact class, and what they keep of a contact (``effects/columns.py``).
+        # Parameters of effects by contact class, and their memory of each contact (``effects/columns.py``).
         self.effects = c.effects
         room = (c.worlds, c.contacts, KEPT) if c.effects else (1, 1, 1)
         self.effect = Group({"row": ti.f64}, (c.worlds, c.kinds * c.kinds, COLUMNS[-1] + 1))
@@ -287,9 +287,9 @@ class State:
         self.sharing = c.sharing
         if c.sharing:
             self.pair = Group(PAIR, (c.worlds, c.contacts))
-            # Entry at which a partner of the body at hand was last met, while the list is built.
+            # Scratch of the list build: first entry of the current body with each partner.
             self.lead = Group({"body": ti.i32, "wall": ti.i32}, (c.worlds, max(c.bodies, c.walls)))
-        # Allocated now: Taichi takes at most 1024 fields at once, and kernels depend on what was allocated before them.
+        # Allocate now: Taichi allocates at most 1024 fields at once, and kernels depend on what was allocated before.
         ti.sync()
 
 
@@ -301,5 +301,5 @@ def _field(dtype, shape):
 
 @cache
 def state(capacity: Capacity) -> State:
-    """Arrays of that capacity; the same ones at every call, so only one batch of a capacity may live at a time."""
+    """Arrays of the given capacity: the same ones at every call, so only one batch of a capacity can be in use."""
     return State(capacity)

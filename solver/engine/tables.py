@@ -1,9 +1,9 @@
-"""Bodies of a world and surfaces of its rig as flat tables: the form in which the arrays of a batch take them.
+"""Bodies of a world and surfaces of its rig as flat tables, in the layout of a batch's arrays.
 
-A triangle mesh becomes smooth patches, who answers at an edge, and a grid to find triangles. Faces that share an edge
-at less than ``SMOOTH_ANGLE`` form a patch, and a sphere has one contact with a patch, at the patch's nearest point:
-rolling over a finely meshed plane is rolling on a plane. Two patches that meet in an edge would both push there; the
-duty at the edge is given to one of them, and to neither where the neighbour's face is nearer.
+A triangle mesh becomes smooth patches, duties (which patch responds at an edge), and a grid to find triangles. Faces
+that share an edge at less than ``SMOOTH_ANGLE`` form a patch, and a sphere has one contact with a patch, at the patch's
+nearest point, so it rolls on a finely meshed plane as on the plane itself. Two patches that meet in an edge would both
+push there; only one of them has the duty to respond, and not where the neighbour's face is nearer.
 Idea: faces before edges before corners (Hu, Hu & Song 2013, Powder Technology 246:516).
 """
 
@@ -32,9 +32,9 @@ Ints = npt.NDArray[np.int32]
 SMOOTH_ANGLE = math.radians(5.0)
 """Largest angle between the normals of neighbouring faces that act as one surface."""
 TRIANGLES_PER_CELL = 2.0
-"""The grid has about one cell for this many triangles along each of its two directions of the surface."""
+"""Triangles per cell that the surface crosses, about: the grid has √(triangles / this) cells along its longest axis."""
 MAX_CELLS = 64
-"""Most cells of the grid along an axis."""
+"""Largest number of grid cells along an axis."""
 KEEP, LEAVE, SEE_GUARD = 0, 1, 2
 """Duties at an edge, as in ``state.TRIANGLE``."""
 PLANE, REVOLVED, PATCH = 0, 1, 2
@@ -43,10 +43,10 @@ PLANE, REVOLVED, PATCH = 0, 1, 2
 
 @dataclass(frozen=True)
 class BodyTables:
-    """Bodies of one world in order of entry, as the arrays want them (n bodies, m member spheres)."""
+    """Bodies of one world in order of entry, in the layout of the arrays (n bodies, m member spheres)."""
 
     numbers: Array
-    """mass, inertia (3), reach, and what :func:`outline` gives (5); shape (n, 10)."""
+    """mass, inertia (3), reach, and the result of :func:`outline` (5); shape (n, 10)."""
     places: Ints
     """first member, number of members, contact class; shape (n, 3)."""
     spheres: Array
@@ -109,10 +109,10 @@ class MeshWall:
 
 
 def body_tables(scene: Scene, order: Ints, scale: Array | None = None) -> BodyTables:
-    """Arrange bodies of the components in ``order`` (index into ``scene.bodies``, in order of entry).
+    """Tables of the bodies of a world; ``order`` contains the component of each (index into ``scene.bodies``).
 
-    ``scale`` (n,) is the linear size s of each body, by default 1: spheres and reach go with s, mass with s³, inertia
-    with s⁵.
+    Bodies are in order of entry. ``scale`` (n,) is the linear size s of each body, by default 1: spheres and reach
+    scale with s, mass with s³, inertia with s⁵.
     """
     scale = np.ones(len(order)) if scale is None else scale
     clumps = [body.clump for body in scene.bodies]
@@ -132,11 +132,12 @@ def body_tables(scene: Scene, order: Ints, scale: Array | None = None) -> BodyTa
 
 
 def outline(body: Body) -> tuple[float, ...]:
-    """What the air meets: semi-axes (3) [m], diameter of the sphere of the same volume [m], sphericity φ.
+    """Data for air drag: semi-axes (3) [m], diameter of the sphere of the same volume [m], sphericity φ.
 
     The surface is that of the ellipsoid with the body's outer dimensions, within 1.1 % (K. Thomsen 2004):
-    4π (((ab)ᵖ + (ac)ᵖ + (bc)ᵖ)/3)^(1/p), p = 1.6075. A convex body shows a quarter of its surface on average
-    (Cauchy), 1/φ times what the sphere of its volume shows; semi-axes are √φ times the body's own, for the same mean.
+    4π (((ab)ᵖ + (ac)ᵖ + (bc)ᵖ)/3)^(1/p), p = 1.6075. The projected area of a convex body is a quarter of its surface
+    on average (Cauchy), 1/φ times that of the sphere of its volume; the semi-axes are √φ times the body's own, so that
+    the mean projected area is the sphere's.
     """
     a, b, c = (extent / 2.0 for extent in body.extents)
     diameter = (6.0 * body.mass / (math.pi * body.density)) ** (1.0 / 3.0)
@@ -144,13 +145,13 @@ def outline(body: Body) -> tuple[float, ...]:
     surface = 4.0 * math.pi * (((a * b) ** p + (a * c) ** p + (b * c) ** p) / 3.0) ** (1.0 / p)
     sphericity = math.pi * diameter**2 / surface
     shown = math.sqrt(sphericity)
-    # A body that is fuller than that ellipsoid has less surface than a sphere of its volume by this.
+    # By this formula, a body fuller than the ellipsoid may have less surface than a sphere of its volume.
     return shown * a, shown * b, shown * c, diameter, min(1.0, sphericity)
 
 
 @lru_cache(maxsize=32)
 def wall_tables(surfaces: tuple[Surface, ...]) -> WallTables:
-    """Arrange ``surfaces``; wall k of the arrays is ``surfaces[k]``."""
+    """Tables of ``surfaces``; wall k of the arrays is ``surfaces[k]``."""
     primitives = [k for k, surface in enumerate(surfaces) if not isinstance(surface, TriangleMesh)]
     geometry = [_segment(surfaces[k]) for k in primitives]
     rows = [(REVOLVED if isinstance(surfaces[k], Revolved) else PLANE, k) for k in primitives]
@@ -164,7 +165,7 @@ def wall_tables(surfaces: tuple[Surface, ...]) -> WallTables:
             continue
         mesh = mesh_wall(surface)
         grids[k], cells[k] = (*mesh.low, mesh.cell), (*mesh.cells, cell_count)
-        # Where one mesh's cells end and the next one's begin, the ends meet.
+        # The end of a mesh's last cell is the beginning of the next mesh's first cell, so it is stored once.
         first.append(mesh.first[:-1] + item_count)
         items.append(mesh.items + triangle_count)
         cell_count += len(mesh.first) - 1
@@ -207,9 +208,9 @@ def mesh_wall(surface: TriangleMesh) -> MeshWall:
 
 
 def extent(surface: Surface, angular_velocity: Sequence[float], domain: float) -> float:
-    """Distance [m] from its origin of the furthest point that ``angular_velocity`` displaces; ``domain``: of a plane.
+    """Distance [m] from the origin to the furthest point that ``angular_velocity`` displaces; ``domain`` for a plane.
 
-    A surface that turns about its own axis of symmetry stays where it is.
+    A surface that rotates about its own axis of symmetry is not displaced: the distance is zero.
     """
     omega = np.array(angular_velocity, dtype=float)
     axis = rotation_matrix(np.array(surface.pose.quaternion)) @ np.array([0.0, 0.0, 1.0])
@@ -237,7 +238,7 @@ def _joined(tables: Sequence[npt.NDArray[Any]], width: int) -> Array:
 
 
 def _patches(mesh: trimesh.Trimesh) -> Ints:
-    """Number of the smooth patch of each face, whichever way the faces are wound."""
+    """Number of the smooth patch of each face; it does not depend on how the faces are wound."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -245,7 +246,7 @@ def _patches(mesh: trimesh.Trimesh) -> Ints:
     ends = mesh.vertices[mesh.face_adjacency_edges]
     centres = mesh.triangles.mean(axis=1)
     one, two = _away(ends, centres[pairs[:, 0]]), _away(ends, centres[pairs[:, 1]])
-    # Two halves of a flat sheet lead away from their edge in opposite directions.
+    # In a flat sheet, the directions from the shared edge into the two faces are opposite.
     smooth = pairs[-(one * two).sum(axis=1) > math.cos(SMOOTH_ANGLE)]
     links = coo_matrix((np.ones(len(smooth)), (smooth[:, 0], smooth[:, 1])), shape=(n, n))
     return np.asarray(connected_components(links, directed=False)[1], dtype=np.int32)
@@ -266,12 +267,12 @@ def _edge_duties(mesh: trimesh.Trimesh, patch: Ints) -> tuple[Ints, Array]:
 
 
 def _edge_of(face: npt.NDArray[np.int64], ends: npt.NDArray[np.int64]) -> int:
-    """Which of ab, bc, ca of ``face`` joins the vertices ``ends``."""
+    """Index of the edge (ab, bc, ca) of ``face`` that joins the vertices ``ends``."""
     return next(k for k in range(3) if {int(face[k]), int(face[(k + 1) % 3])} == {int(ends[0]), int(ends[1])})
 
 
 def _away(ends: Array, centre: Array) -> Array:
-    """Unit vectors (…, 3) at right angles from the lines through ``ends`` (…, 2, 3) towards ``centre`` (…, 3)."""
+    """Unit vectors (…, 3) perpendicular to the lines through ``ends`` (…, 2, 3), towards ``centre`` (…, 3)."""
     along = ends[..., 1, :] - ends[..., 0, :]
     along = along / np.linalg.norm(along, axis=-1, keepdims=True)
     gap = centre - ends[..., 0, :]
@@ -287,7 +288,7 @@ def _vertex_duties(mesh: trimesh.Trimesh, patch: Ints) -> Ints:
 
 
 def _grid(triangles: Array) -> tuple[Array, float, tuple[int, int, int], Ints, Ints]:
-    """Cells over the bounding boxes of the triangles (n, 3, 3): lower corner, edge, counts, starts and contents."""
+    """Grid over the bounding boxes of the triangles (n, 3, 3): lower corner, cell edge, counts, starts and contents."""
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     span = float((high - low).max())
     cell = span / max(1.0, min(float(MAX_CELLS), math.sqrt(len(triangles) / TRIANGLES_PER_CELL)))

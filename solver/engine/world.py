@@ -1,4 +1,4 @@
-"""A batch of worlds: the only owner of mutable state. NumPy in, NumPy out; no formula of physics stands here."""
+"""A batch of worlds: the only owner of mutable state. NumPy in, NumPy out; this file contains no physics."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -44,7 +44,7 @@ SUMMARY_COLUMNS = (
     "wall_work",
     "taken_out",
 )
-"""Columns of a summary, SI; what they mean stands in ``state.SUMMARY`` and ``state.WORLD``."""
+"""Columns of a summary, in SI units; ``state.SUMMARY`` and ``state.WORLD`` describe them."""
 
 
 def wall_materials(scene: Scene) -> tuple[str, ...]:
@@ -53,7 +53,7 @@ def wall_materials(scene: Scene) -> tuple[str, ...]:
 
 
 def law_table(scene: Scene) -> Array:
-    """Constants of the contact law, shape (kinds, kinds, its columns): the bodies, then the wall materials."""
+    """Constants of the contact law, shape (kinds, kinds, columns of the law); kinds: bodies, then wall materials."""
     walls, law = wall_materials(scene), CONTACT_LAWS[scene.contact.law]
     n = len(scene.bodies)
     materials = [scene.material(body.material) for body in scene.bodies] + [scene.material(name) for name in walls]
@@ -67,9 +67,9 @@ def law_table(scene: Scene) -> Array:
 
 
 def compiled_in(scenes: Sequence[Scene]) -> dict[str, Any]:
-    """What kernels for ``scenes`` are compiled with, by field of :class:`Capacity`: effects, sharing, contact law.
+    """Fields of :class:`Capacity` with which kernels for ``scenes`` are compiled: effects, sharing, contact law.
 
-    Raises ValueError for scenes of several laws, which share no kernels.
+    Raises ValueError for scenes with different laws, which cannot share kernels.
     """
     law, *others = sorted({scene.contact.law for scene in scenes})
     if others:
@@ -82,7 +82,7 @@ def compiled_in(scenes: Sequence[Scene]) -> dict[str, Any]:
 
 
 def settings_of(scene: Scene, bodies: BodyTables, dt: float) -> dict[str, Any]:
-    """What a world is set up with, by ``transfer.SETTINGS``."""
+    """Values of ``transfer.SETTINGS`` with which a world is set up."""
     numerics, inside = scene.numerics, scene.rig.container(0.0)
     return {
         "dt": dt,
@@ -99,7 +99,7 @@ def settings_of(scene: Scene, bodies: BodyTables, dt: float) -> dict[str, Any]:
 
 
 class Batch:
-    """Worlds side by side. ``w`` is the index of a world throughout, ``wall`` that of a surface of its rig."""
+    """Independent worlds. ``w`` is always the index of a world, ``wall`` that of a surface of its rig."""
 
     def __init__(self, capacity: Capacity) -> None:
         self.capacity = capacity
@@ -137,7 +137,7 @@ class Batch:
 
     @property
     def _s(self) -> State:
-        """The arrays, as long as no later batch of the same capacity has taken them over."""
+        """The arrays. Raises RuntimeError if a later batch of the same capacity has taken them over."""
         if self._arrays.owner is not self:
             raise RuntimeError("a later batch of the same capacity uses these arrays")
         return self._arrays
@@ -176,7 +176,7 @@ class Batch:
         modify.scale_springs(self._s, w, np.ascontiguousarray(ratio.ravel()))
 
     def enter(self, w: int, b: int, position: Array, quaternion: Array, velocity: Array, spin: Array) -> None:
-        """Let body ``b`` enter (or put it somewhere else): SI, quaternion wxyz, spin in the principal frame."""
+        """Let body ``b`` enter, or move it elsewhere; SI units, quaternion wxyz, spin in the principal frame."""
         pose = np.concatenate([position, quaternion, velocity, spin]).astype(float)
         modify.load_state(self._s, w, b, pose)
 
@@ -191,11 +191,11 @@ class Batch:
         modify.set_motion(self._s, w, wall, np.array([*velocity, *angular_velocity, reach], dtype=float))
 
     def set_pull(self, w: int, b: int | None, force: Sequence[float]) -> None:
-        """Pull at the centre of mass of body ``b`` with ``force`` [N] from now on; None: at none. Wakes all bodies."""
+        """Pull body ``b`` (None: no body) at its centre of mass with ``force`` [N] from now on; wakes all bodies."""
         modify.set_pull(self._s, w, 0 if b is None else b + 1, *(float(component) for component in force))
 
     def set_container(self, w: int, inside: Container) -> None:
-        """What counts as inside the rig from now on (a cylinder that is lifted takes its inside along)."""
+        """Set what counts as inside the rig from now on (the inside of a lifted cylinder moves with it)."""
         modify.set_container(self._s, w, inside.height, inside.radius)
 
     def run(self, steps: Ints) -> None:
@@ -205,12 +205,12 @@ class Batch:
         backend.keep_compiled()
 
     def advance(self, steps: Ints) -> Array:
-        """:meth:`run`, and :meth:`summary` of what it came to."""
+        """:meth:`run`; returns :meth:`summary`."""
         self.run(steps)
         return self.summary()
 
     def measure(self, w: int) -> Array:
-        """Bring the summary of world ``w`` up to date without a step; returns :meth:`summary`."""
+        """Update the summary of world ``w`` without a step; returns :meth:`summary`."""
         measure(self._s, w)
         return self.summary()
 
@@ -221,7 +221,7 @@ class Batch:
         return out
 
     def take_out(self, w: int) -> int:
-        """Take bodies out that left the domain, and start looking for the largest overlap anew; returns the lost."""
+        """Take out bodies that left the domain, and reset the largest overlap; returns the number of lost bodies."""
         modify.clear_overlap(self._s, w)
         return int(take_out(self._s, w))
 
@@ -243,7 +243,7 @@ class Batch:
     def surface_state(self, w: int) -> Array:
         """Per surface: origin 0:3, quaternion 3:7, velocity 7:10, angular velocity 10:13, force 13:16, torque 16:19.
 
-        The pose is that after the last step, force [N] and torque about the origin [N m] are those at its beginning.
+        The pose is that after the last step; force [N] and torque about the origin [N m] are those at its beginning.
         """
         out = np.zeros((len(self._scenes[w].rig.surfaces()), 19))
         transfer.read_walls(self._s, w, out)
@@ -254,15 +254,15 @@ class Batch:
         return snapshot.take(self._s, w)
 
     def put(self, w: int, arrays: Arrays) -> None:
-        """Put a world back that :meth:`take` gave, after :meth:`load` with the same scene."""
+        """Restore a world that :meth:`take` returned, after :meth:`load` with the same scene."""
         snapshot.put(self._s, w, arrays)
 
     def take_moving(self, w: int, bodies: int, members: int) -> Moving:
-        """What moves in world ``w``, of which ``bodies`` with ``members`` spheres are loaded: for this slot only."""
+        """Changing state of world ``w`` with ``bodies`` bodies and ``members`` spheres loaded; for this slot only."""
         return moving_state.take(self._s, w, bodies, members)
 
     def put_moving(self, w: int, kept: Moving) -> None:
-        """Put back what :meth:`take_moving` gave; law and effects have to be those of that moment."""
+        """Restore what :meth:`take_moving` returned; contact law and effects must be the same as then."""
         moving_state.put(self._s, w, kept)
 
     def _load_walls(self, w: int, scene: Scene, tables: WallTables, active: Sequence[bool]) -> None:

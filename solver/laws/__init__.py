@@ -1,7 +1,8 @@
-"""Contact laws: the force between two bodies that overlap, one file each; ``law.py`` says what one is.
+"""Contact laws: the force between two overlapping bodies, one law per file; ``law.py`` defines the interface.
 
-To add one: a file with a class of ``ContactLaw`` here, or a package with an entry point (``solver.plugins``). A scene
-names its law in ``contact.law``; kernels are compiled for it, and scenes of different laws share no batch.
+To add one, write a file here with a class of ``ContactLaw`` and add it to the list below, or provide a package with an
+entry point (``solver.plugins``). A scene names its law in ``contact.law``; a batch is compiled for one law, so scenes
+with different laws cannot share a batch.
 """
 
 from solver.laws.hertz_mindlin import HertzMindlin

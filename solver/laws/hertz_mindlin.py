@@ -4,16 +4,17 @@ Notation: grain i is pushed by j; normal n from j to i; overlap δ > 0 when touc
 
     normal        F_n = max(0, 4/3 E* a δ − c_n √(2 E* a m*) v_n)            [N]
     tangential    k_t = 8 G* a; elastic force T (stored in the world frame):
-                  turned with the normal, its length restored; scaled by a/a_prev on unloading;
+                  rotated with the normal, its length kept; scaled by a/a_prev on unloading;
                   T ← T − k_t v_t dt, capped at μ F_n
                   F_t = T − c_t √(k_t m*) v_t while sticking, T while slipping; capped at μ F_n as well
 
-Two choices of ``material.py`` are conventions of other programs: ``mindlin`` scales T by a/a_prev on loading too,
-which keeps the displacement T/k_t (LIGGGHTS ``tangential history``), and ``uncapped`` leaves the dashpot beside μ F_n.
+Two options of ``material.py`` are conventions of other programs: ``mindlin`` scales T by a/a_prev on loading too,
+which keeps the displacement T/k_t (LIGGGHTS ``tangential history``), and ``uncapped`` exempts the dashpot from the
+limit μ F_n.
 
-R* comes from the member spheres, m* from the bodies. c_n(e) inverts this contact exactly (`restitution.py`), so that
-the restitution that comes out is the one that was asked for; c_t = 2 √(5/6) |β|, β = ln e / √(ln² e + π²) (Tsuji 1992
-as used in LIGGGHTS).
+R* comes from the member spheres, m* from the bodies. c_n(e) is the exact inverse for this contact (`restitution.py`),
+so an impact reproduces the declared restitution; c_t = 2 √(5/6) |β|, β = ln e / √(ln² e + π²) (Tsuji 1992 as used in
+LIGGGHTS).
 Sources: Hertz 1882; Mindlin & Deresiewicz 1953; rescaling on unloading: Thornton, Cummins & Cleary 2013, Powder
 Technology 233:30.
 """
@@ -34,7 +35,7 @@ def tangential_damping(restitution: float) -> float:
 
 @kernel_function
 def nothing_more(law, reduced_radius, reduced_mass):
-    """The contact radius says all that this law needs of R*, and dashpots are told their mass."""
+    """Unused by this law: the contact radius contains R*, and the dashpots receive their mass as an argument."""
     return 0.0
 
 
@@ -48,8 +49,8 @@ def normal_spring_force(law, scale, a, overlap):
 def normal_damper(law, scale, a, mass, a_before, overlap, v_n, dt):
     """c_n √(2 E* a m*) [kg/s].
 
-    ∝ δ^(1/4), steep where the contact begins: in its first step the mean over the way from the touch to half a step
-    ahead, 4/5 δ₊^(5/4)/(|v_n| dt), stands for the value at δ.
+    It is ∝ δ^(1/4), which rises steeply at the start of a contact. In the first step the value at δ is therefore
+    replaced by the mean over the step, 4/5 δ₊^(5/4)/(|v_n| dt), where δ₊ is the overlap half a step ahead.
     """
     damper = law.normal_damping * ti.sqrt(a * mass)
     if a_before == 0.0 and v_n < 0.0:
@@ -85,7 +86,7 @@ def shear_damper(law, scale, a, mass):
 
 @kernel_function
 def growth(a, a_before, displaced):
-    """a/a_prev, while loading only if the spring keeps its displacement instead of its force."""
+    """a/a_prev on unloading; on loading too if the spring keeps its displacement instead of its force."""
     factor = 1.0
     if a_before > 0.0:
         factor = a / a_before
@@ -96,7 +97,7 @@ def growth(a, a_before, displaced):
 
 @kernel_function
 def shear_energy(law, scale, spring2, a):
-    """T²/(16 G* a) [J]; 0 apart."""
+    """T²/(16 G* a) [J]; 0 when apart."""
     energy = 0.0
     if a > 0.0:
         energy = spring2 / (16.0 * law.g_star * a)
@@ -105,7 +106,7 @@ def shear_energy(law, scale, spring2, a):
 
 @kernel_function
 def shear_energy_gain(law, scale, old2, a_before, new2, a):
-    """The difference with one division [J]."""
+    """Difference of the two spring energies [J], computed with a single division."""
     numerator, denominator = new2, 16.0 * law.g_star * a
     if a_before > 0.0:
         numerator = new2 * a_before - old2 * a
@@ -138,7 +139,7 @@ class HertzMindlin(ContactLaw):
     def constants(one: Material, two: Material, pair: Pair, contact: object) -> tuple[float, ...]:
         """E* [Pa], G* [Pa], μ, c_n √(2 E*), c_t √(8 G*).
 
-        Both dampings are ∝ √(a m*), so the kernel takes one square root for the two.
+        Both dashpots are ∝ √(a m*), so the kernel takes one square root for both.
         """
         e_star, g_star = effective_youngs_modulus(one, two), effective_shear_modulus(one, two)
         return (

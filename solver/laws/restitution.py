@@ -1,19 +1,19 @@
-"""Damping that gives back the restitution that was asked for: the exact inverse of the damped contact, of either law.
+"""Damping that reproduces the declared restitution: the exact inverse of the damped impact, for both laws.
 
 An impact with the normal force of `hertz_mindlin.py` is, with k = 4/3 E* √R*, overlap δ and mass m*,
 
     m* δ'' = −max(0, k δ^(3/2) + c_n √(3/2 k m*) δ^(1/4) δ'),   δ(0) = 0,  δ'(0) = v
 
-(2 E* a = 3/2 k √δ). With s ∝ δ^(5/4) as the coordinate and dθ ∝ δ^(1/4) dt as the clock it becomes the linear damped
+(2 E* a = 3/2 k √δ). With s ∝ δ^(5/4) as the coordinate and dθ ∝ δ^(1/4) dt as the time it becomes the linear damped
 oscillator d²s/dθ² + 2 ζ ds/dθ + s = 0, with ζ = √0.3 c_n (Antypov & Elliott 2011, EPL 94:50004); the contact of
-`linear_spring_dashpot.py` is that oscillator as it stands, with s = δ and ζ = γ/(2 √(m* k_n)). The force is never
-tensile, so the impact is over when s + 2 ζ ds/dθ = 0, before the overlap is (as in Schwager & Pöschel 2007, Granular
-Matter 9:465, for the linear dashpot). The solution at that moment, put together, is
+`linear_spring_dashpot.py` is already this oscillator, with s = δ and ζ = γ/(2 √(m* k_n)). The force is never tensile,
+so the impact ends when s + 2 ζ ds/dθ = 0, before the overlap has vanished (as in Schwager & Pöschel 2007, Granular
+Matter 9:465, for the linear dashpot). The solution at that time gives
 
     e = exp(−(π − 2 φ) tan φ)      ζ = sin φ ≤ 1     (e ≥ exp(−2) = 0.135)
     e = exp(−2 ψ coth ψ)           ζ = cosh ψ ≥ 1
 
-whatever the speed, size and stiffness. ζ decreases with e, so bisection inverts it to rounding.
+for any speed, size and stiffness. ζ decreases with e, so bisection inverts the relation to rounding error.
 """
 
 import math
@@ -39,7 +39,7 @@ def normal_damping(restitution: float) -> float:
 
 @lru_cache(maxsize=1024)
 def damping_ratio(restitution: float) -> float:
-    """ζ, dimensionless, for a restitution 0 < e ≤ 1; 0 for e = 1. Good to 1e-9 of itself."""
+    """ζ, dimensionless, for a restitution 0 < e ≤ 1; 0 for e = 1. Relative error below 1e-9."""
     if not 0.0 < restitution <= 1.0:
         raise ValueError(
             f"restitution: {restitution:g}; allowed: more than 0 (which needs infinite damping) and at most 1"

@@ -1,6 +1,7 @@
 """The kernel that runs a batch: worlds in parallel, the steps of a world one after the other, and a summary at the end.
 
-The summary of a world as it stands is its energies, its masses and the fastest body; it changes nothing of the motion.
+The summary of a world contains its energies, its masses and the speed of the fastest body; it does not affect the
+motion.
 """
 
 from solver.backend import lanes, serial, ti
@@ -15,9 +16,9 @@ from solver.scenes.numerics import ROLLING_SLOPE
 
 @ti.func
 def rolls_away(s: ti.template(), w, b):
-    """1 for a single body that rolls outward on the plate, beyond the feed opening's radius: no part of the pile.
+    """1 for a single body that rolls outward on the plate, beyond the feed opening's radius: not part of the pile.
 
-    Without rolling resistance it may roll for ever; it must not keep the run going.
+    Without rolling resistance it may roll for ever, which must not keep the run going.
     """
     x, v = s.body.position[w, b], s.body.velocity[w, b]
     beyond = x[0] * x[0] + x[1] * x[1] > s.world.inlet_radius[w] ** 2
@@ -38,7 +39,7 @@ def body_energy(s: ti.template(), w, b):
 
 @ti.func
 def sum_contacts(s: ti.template(), w):
-    """Touching contacts, how many of them each body has with others, and the energy in the springs (last step)."""
+    """Count touching contacts, in total and per body with others, and sum the energy in the springs (last step)."""
     s.summary.elastic[w] = 0.0
     s.summary.touching[w] = 0
     for b in range(s.world.bodies[w]):
@@ -124,10 +125,10 @@ def step(s: ti.template(), w):
 
 @ti.kernel
 def advance(s: ti.template(), steps: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-    """Run world w for ``steps[w]`` steps and summarise it; worlds with no steps stay untouched.
+    """Run world w for ``steps[w]`` steps and summarise it; worlds with no steps are left unchanged.
 
-    A world has several loop iterations, all but one of them idle: a CPU thread is given so many in a row that a loop
-    over few worlds would run on one thread. Threads get equal, contiguous shares of the worlds.
+    A world has several loop iterations, all but one of them idle: each CPU thread is given so many consecutive
+    iterations that a loop over few worlds would run on one thread. Threads get equal, contiguous shares of the worlds.
     """
     ti.loop_config(serialize=ti.static(serial()))
     for lane in range(steps.shape[0] * ti.static(lanes())):
@@ -148,10 +149,10 @@ def measure(s: ti.template(), world_index: ti.i32):
 
 @ti.kernel
 def take_out(s: ti.template(), world_index: ti.i32) -> ti.i32:
-    """Take bodies out that left the domain; returns how many were lost.
+    """Take out bodies that left the domain; returns how many were lost.
 
-    Rolling or bouncing out over the plate is a stray, however high a body that has come out of the outlet bounces;
-    leaving above the outlet without having come out of it, or through the plate, is a loss.
+    A body that has come out of the outlet and rolls or bounces off the plate is a stray, however high it bounces. One
+    that leaves without having come out of the outlet, or through the plate, is lost.
     """
     lost = 0
     ti.loop_config(serialize=ti.static(serial()))

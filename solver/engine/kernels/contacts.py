@@ -1,6 +1,6 @@
-"""Forces of all contacts of one world, each pair once and in the order of the list (so the bits repeat).
+"""Forces of all contacts of one world, each pair once and in the order of the list (so results repeat bit for bit).
 
-:func:`push` adds them to the bodies; :func:`read_contacts` tells the contacts as they are and changes nothing.
+:func:`push` adds them to the bodies; :func:`read_contacts` reads the contacts and changes nothing.
 """
 
 from solver.backend import serial, ti
@@ -25,20 +25,20 @@ from solver.engine.state import Vec3
 from solver.laws.law import normal_force, tangential_force
 
 HELD_OVERLAP = 1e-45
-"""Overlap [m] that stands for surfaces held at a gap: their contact radius, 1e-24 m, bears and damps nothing."""
+"""Overlap [m] used for surfaces held at a gap: the resulting contact radius, 1e-24 m, carries and damps nothing."""
 APART = 1e-20
 """Contact radius [m] below which surfaces are held at a gap and do not touch."""
 
 
 @ti.func
 def scale_of(s: ti.template(), w, k, law):
-    """What the contact law takes of the bodies of entry ``k``."""
+    """The contact law's ``scale`` for entry ``k``."""
     return s.contact_law.scale(law, s.contact.reduced_radius[w, k], s.contact.reduced_mass[w, k])
 
 
 @ti.func
 def lose(s: ti.template(), w, k, law):
-    """Entry ``k`` has come apart: its spring is gone, and so is the energy in it."""
+    """Clear entry ``k``, whose surfaces have separated; the energy in its spring is dissipated."""
     spring2 = s.contact.spring[w, k].norm_sqr()
     energy = s.contact_law.shear_energy(law, scale_of(s, w, k, law), spring2, s.contact.radius[w, k])
     s.world.dissipated[w] = s.world.dissipated[w] + energy
@@ -51,7 +51,7 @@ def lose(s: ti.template(), w, k, law):
 
 @ti.func
 def push_wall(s: ti.template(), w, k, point, force, couple, held):
-    """Take the reaction to ``force`` [N] and ``couple`` [N m] on a body at ``point`` into wall ``k``, and its work."""
+    """Add to wall ``k`` the reaction to ``force`` [N] and ``couple`` [N m] on a body at ``point``; count its work."""
     torque = (point - s.wall.origin[w, k]).cross(force) + couple
     s.wall.force[w, k] = s.wall.force[w, k] - force
     s.wall.torque[w, k] = s.wall.torque[w, k] - torque
@@ -65,7 +65,7 @@ def push_wall(s: ti.template(), w, k, point, force, couple, held):
 
 @ti.func
 def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, whole, elastic, damper, mass, part):
-    """What effects see of entry ``k`` before they act; ``whole`` [N]: what ``elastic`` is this contact's share of."""
+    """What effects see of entry ``k`` before they act; ``elastic`` [N] is this contact's share of ``whole`` [N]."""
     row = s.contact.law[w, k]
     law = s.law.row[w, row]
     scale = scale_of(s, w, k, law)
@@ -106,14 +106,14 @@ def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, whole, elas
 
 @ti.func
 def respond(s: ti.template(), w, k, n, overlap, velocity, omega, mass, part, still):
-    """Force [N] and torque [N m] on body a of entry ``k``, energy that it takes and what of it its spring keeps [J].
+    """Force [N] and torque [N m] on body a of entry ``k``, energy that it takes and the part its spring stores [J].
 
-    ``velocity`` is that of a relative to its partner at the contact, ``omega`` the relative angular velocity (only
-    effects ask for it). A torque comes from effects alone; it acts on both bodies, in opposite directions.
-    ``mass`` [kg] is what the dashpots damp, ``part`` the contact's share in its pair (``narrowphase.py``).
+    ``velocity`` is that of a relative to its partner at the contact, ``omega`` the relative angular velocity (used only
+    by effects). A torque comes from effects alone; it acts on both bodies, in opposite directions. ``mass`` [kg] is the
+    mass that the dashpots damp, ``part`` the contact's share in its pair (``narrowphase.py``).
 
-    If ``still``, nothing moves in the entry and no step passes: what it keeps stays as it is, and no energy goes. Such
-    an entry is evaluated whenever the list is built, so anything else would let the list's length act on the motion.
+    If ``still``, nothing moves in the entry: what it keeps is unchanged, and no energy is counted. Such an entry is
+    evaluated whenever the list is built; otherwise the frequency of list builds would affect the motion.
     """
     dt = s.world.dt[w]
     law = s.law.row[w, s.contact.law[w, k]]
@@ -165,8 +165,8 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega, mass, part, sti
         touch = pass_stage(s, w, k, touch, Stage.ROLLING, still)
         touch = pass_stage(s, w, k, touch, Stage.TWISTING, still)
         torque = touch.torque
-    # Work against the damper and the tangential force, at the mean of the velocities before and after the step: half of
-    # it now, half when the next velocity is known; less what has gone into the spring.
+    # Work against the damper and the tangential force, at the mean of the velocities before and after the step: half is
+    # counted now, half when the next velocity is known. What the spring stores is subtracted.
     taken, stored = 0.0, 0.0
     if not still:
         loss = (spring_force - f_n) * n - f_t
@@ -192,10 +192,11 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega, mass, part, sti
 
 @ti.func
 def push(s: ti.template(), w):
-    """Add the force and torque of every live entry that touches to its bodies; keep springs and contact radii.
+    """Add the force and torque of every live entry that touches to its bodies; update springs and contact radii.
 
-    The list is ordered by the first body, so its sum stays in registers until the next one comes. After a change of
-    who is awake the entries in which nothing moves follow the live ones once: they hold the sleepers.
+    The list is ordered by the first body, so the sum for that body stays in registers until the next one. After a body
+    woke or fell asleep, the entries in which nothing moves are evaluated once, after the live ones: they give the held
+    forces on sleeping bodies.
     """
     largest, dissipated = s.world.overlap[w], 0.0
     present = -1
@@ -278,8 +279,8 @@ def push(s: ti.template(), w):
 def read_contacts(s: ti.template(), world: ti.i32, out: Table, count: IntRow):
     """One row per acting contact: body a, body b or -1 - wall, point (3), normal from b to a (3), force on a (3).
 
-    The force is that of the last step: the elastic part along the normal, less the part that takes energy
-    (``contact.loss``), which holds damping and friction. ``count[0]`` says how many rows are filled.
+    The force is that of the last step: the elastic part along the normal minus ``contact.loss``, which contains damping
+    and friction. ``count[0]`` is the number of filled rows.
     """
     ti.loop_config(serialize=ti.static(serial()))
     for w in range(world, world + 1):

@@ -1,8 +1,8 @@
-"""Where the steps of a world call the effects: a contact passes their stages, a body what acts on it in flight.
+"""Where a step calls the effects: contact effects stage by stage, body effects on every body that moves.
 
-Compiled in only for batches whose capacity has ``effects``; a world in which an effect's first amplitude is zero passes
-it by. Parameters of a contact effect stand in its columns of ``effect.row`` (by contact class), what a contact keeps in
-its columns of ``effect.memory``.
+Compiled in only for batches whose capacity has ``effects``; where an effect's first amplitude is zero, it is skipped.
+Parameters of a contact effect are in its columns of ``effect.row`` (by contact class), what a contact keeps is in its
+columns of ``effect.memory``.
 """
 
 from solver.backend import ti
@@ -17,7 +17,7 @@ BODY_ACTS = tuple(kind.act for kind in BODY_EFFECTS)
 
 @ti.func
 def pass_stage(s: ti.template(), w, k, touch, stage: ti.template(), still):
-    """``touch``, entry ``k`` of the list, after the effects of one stage; ``still``: what they keep stays as it is."""
+    """``touch`` (entry ``k`` of the list) after the effects of one stage; if ``still``, their memory is unchanged."""
     for index in ti.static(range(len(CONTACT_EFFECTS))):
         if ti.static(CONTACT_EFFECTS[index].stage == stage):
             row = s.contact.law[w, k]
@@ -36,7 +36,7 @@ def pass_stage(s: ti.template(), w, k, touch, stage: ti.template(), still):
 
 @ti.func
 def forget(s: ti.template(), w, k):
-    """Entry ``k`` has come apart: what effects kept of it is gone."""
+    """Clear what effects keep of entry ``k``, whose surfaces have separated."""
     for column in ti.static(range(KEPT)):
         s.memory.number[w, k, column] = 0.0
 
@@ -49,7 +49,7 @@ def last_couple(s: ti.template(), w, k):
 
 @ti.func
 def keep(s: ti.template(), w, k, torque, hertz):
-    """Note what the energy account needs of entry ``k``: torque [N m] and contact radius without adhesion [m]."""
+    """Store what the energy account needs of entry ``k``: torque [N m] and contact radius without adhesion [m]."""
     for d in ti.static(range(3)):
         s.memory.number[w, k, ti.static(COUPLE + d)] = torque[d]
     s.memory.number[w, k, HERTZ] = hertz
@@ -57,7 +57,7 @@ def keep(s: ti.template(), w, k, torque, hertz):
 
 @ti.func
 def body_force(s: ti.template(), w, b):
-    """Force [N] of the body effects on body ``b``; their parameters stand in the row of the first contact class."""
+    """Force [N] of the body effects on body ``b``; their parameters are in the row of the first contact class."""
     force = Vec3(0.0, 0.0, 0.0)
     for index in ti.static(range(len(BODY_EFFECTS))):
         column = ti.static(COLUMNS[len(CONTACT_EFFECTS) + index])

@@ -1,4 +1,4 @@
-"""Rotations, and the nearest point of primitives and triangles."""
+"""Rotations, and nearest points on primitives and triangles."""
 
 from solver.backend import ti
 from solver.engine.state import Mat3, Vec3, Vec4
@@ -19,7 +19,7 @@ def rotation(q):
 
 @ti.func
 def turned(q, spin, dt):
-    """Quaternion after turning by ``spin`` [rad/s, local frame] for ``dt``; exact to O(|spin dt|³)."""
+    """Quaternion after rotation with ``spin`` [rad/s, local frame] for ``dt`` [s]; exact to O(|spin dt|³)."""
     h = 0.5 * dt * spin
     new = Vec4(
         q[0] - q[1] * h[0] - q[2] * h[1] - q[3] * h[2],
@@ -27,7 +27,7 @@ def turned(q, spin, dt):
         q[2] + q[0] * h[1] + q[3] * h[0] - q[1] * h[2],
         q[3] + q[0] * h[2] + q[1] * h[1] - q[2] * h[0],
     )
-    # Newton's step for 1/√(q·q) from 1: a quaternion of length 1 + ε comes out with 1 − 3/2 ε².
+    # One step of Newton's method for 1/√(q·q), started from 1: the length 1 + ε becomes 1 − 3/2 ε².
     return new * (1.5 - 0.5 * new.dot(new))
 
 
@@ -35,8 +35,8 @@ def turned(q, spin, dt):
 def nearest_on_revolved(geometry, point):
     """Unit vector to ``point`` from the nearest point of a revolved segment, and the distance [m]; all in its frame.
 
-    The nearest point is sought in the half plane (r, z), the edges included; a centre exactly on the surface has no
-    normal and feels nothing.
+    The nearest point is found in the half plane (r, z), including the ends of the segment; a sphere whose centre is
+    exactly on the surface has no normal and feels no force.
     """
     r = ti.sqrt(point[0] * point[0] + point[1] * point[1])
     along_r, along_z = geometry[2] - geometry[0], geometry[3] - geometry[1]
@@ -86,5 +86,5 @@ def nearest_on_triangle(a, b, c, point):
 
 @ti.func
 def offset(hit):
-    """The point of :func:`nearest_on_triangle`."""
+    """The nearest point in a result of :func:`nearest_on_triangle`."""
     return Vec3(hit[0], hit[1], hit[2])

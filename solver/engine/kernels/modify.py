@@ -1,4 +1,4 @@
-"""What is changed in a world that runs: laws, effects, entering bodies, walls, gravity. One small kernel per errand."""
+"""Changes to a running world: contact law, effects, entering bodies, walls, gravity. One small kernel per task."""
 
 from solver.backend import serial, ti
 from solver.effects.columns import COLUMNS, MEMORIES, MEMORY
@@ -16,7 +16,7 @@ def disturb(s: ti.template(), w):
 
 @ti.kernel
 def load_law(s: ti.template(), w: ti.i32, table: Table, kinds: ti.i32):
-    """Contact constants of every pair of kinds, by the law's columns, row a · kinds + b."""
+    """Replace the contact constants of every pair of kinds: the law's columns, row a · kinds + b."""
     s.world.kinds[w] = kinds
     rouse_all(s, w)
     ti.loop_config(serialize=ti.static(serial()))
@@ -26,7 +26,7 @@ def load_law(s: ti.template(), w: ti.i32, table: Table, kinds: ti.i32):
 
 @ti.func
 def forget_switched(s: ti.template(), w, k, table: ti.template()):
-    """What contacts of row ``k`` keep of effects that ``table`` switches on or off there begins anew."""
+    """Clear what contacts of row ``k`` keep of effects that ``table`` switches on or off there."""
     for index in ti.static(range(len(MEMORIES))):
         if ti.static(MEMORIES[index] > 0):
             was_on = s.effect.row[w, k, ti.static(COLUMNS[index])] != 0.0
@@ -39,9 +39,9 @@ def forget_switched(s: ti.template(), w, k, table: ti.template()):
 
 @ti.kernel
 def load_effects(s: ti.template(), w: ti.i32, table: Table, grip: ti.f64):
-    """Parameters of the effects of every pair of kinds, row a · kinds + b, and how far apart [m] a pull may hold."""
+    """Replace the effects' parameters of every pair of kinds, row a · kinds + b, and the largest gap [m] of a pull."""
     rouse_all(s, w)
-    # A cell is as long as the largest body with its margins, and the grip.
+    # A cell is as long as the largest body plus margins and grip.
     s.world.cell[w] = s.world.cell[w] + (grip - s.world.grip[w])
     s.world.grip[w] = grip
     s.world.outdated[w] = 1
@@ -81,7 +81,7 @@ def set_active(s: ti.template(), w: ti.i32, wall: ti.i32, active: ti.i32):
 
 @ti.kernel
 def set_container(s: ti.template(), w: ti.i32, height: ti.f64, radius: ti.f64):
-    """What counts as inside the rig: above ``height`` [m] and within ``radius`` [m] of the z axis."""
+    """Set what counts as inside the rig: above ``height`` [m] and within ``radius`` [m] of the z axis."""
     s.world.outlet[w] = height
     s.world.inlet_radius[w] = radius
 
@@ -130,7 +130,7 @@ def set_sleep(s: ti.template(), w: ti.i32, speed: ti.f64, time: ti.f64):
 
 @ti.kernel
 def scale_springs(s: ti.template(), w: ti.i32, ratio: Row):
-    """Multiply tangential springs by the ``ratio`` of their row of the law table: a spring keeps its displacement."""
+    """Multiply tangential springs by the ``ratio`` of their law table row: keeps the displacement of each spring."""
     ti.loop_config(serialize=ti.static(serial()))
     for k in range(s.world.contacts[w]):
         s.contact.spring[w, k] = s.contact.spring[w, k] * ratio[s.contact.law[w, k]]
@@ -138,5 +138,5 @@ def scale_springs(s: ti.template(), w: ti.i32, ratio: Row):
 
 @ti.kernel
 def clear_overlap(s: ti.template(), w: ti.i32):
-    """Start looking for the largest overlap anew."""
+    """Reset the largest overlap."""
     s.world.overlap[w] = 0.0

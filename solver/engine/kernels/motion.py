@@ -1,8 +1,8 @@
 """Motion of rigid bodies: leapfrog with all velocities at one common half step.
 
 Translation  v ← v + dt (F/m + g),  x ← x + dt v.
-Rotation     Euler's equations in the principal frame, I ω' = τ − ω × I ω, by the implicit midpoint rule (which keeps
-             |L| and the energy of a free body), then the quaternion turned by the new spin.
+Rotation     Euler's equations in the principal frame, I ω' = τ − ω × I ω, by the implicit midpoint rule (which
+             conserves |L| and the energy of a free body); then the quaternion is rotated by the new spin.
 """
 
 from solver.backend import ti
@@ -12,12 +12,12 @@ from solver.engine.kernels.neighbours import place_members
 from solver.engine.state import Vec3
 
 MIDPOINT_ITERATIONS = 3
-"""Fixed-point iterations of the midpoint rule; each gains a factor |ω| dt, below 1e-2 here."""
+"""Fixed-point iterations of the midpoint rule; each reduces the error by a factor |ω| dt, below 1e-2 here."""
 
 
 @ti.func
 def prepare(s: ti.template(), w, b):
-    """What contacts need of a listed body: member centres and the angular velocity in the world frame."""
+    """Compute what contacts need of a listed body: member centres and the angular velocity in the world frame."""
     if s.body.listed[w, b] == 1:
         place_members(s, w, b, False)
         s.body.omega[w, b] = s.body.rotation[w, b] @ s.body.spin[w, b]
@@ -25,7 +25,7 @@ def prepare(s: ti.template(), w, b):
 
 @ti.func
 def spun(spin, inertia, inverse, torque, dt):
-    """Spin [rad/s] after ``dt`` under ``torque`` [N m], both in the principal frame; ``inverse`` of the inertia."""
+    """Spin [rad/s] after ``dt`` under ``torque`` [N m], both in the principal frame; ``inverse`` is that of inertia."""
     scale = dt * inverse
     new = spin + scale * torque
     if inertia[0] != inertia[1] or inertia[1] != inertia[2]:

@@ -1,23 +1,24 @@
-"""Where the surfaces of an entry of the contact list meet, whether they act on each other, and on what of a clump.
+"""Where the surfaces of a contact list entry meet, whether they act on each other, and on which mass of a clump.
 
-Of a clump a contact feels the mass that damps it, and a share where several spheres touch the same partner.
+For clumps, ``contact.clump_rule`` decides which mass the dashpots of a contact damp, and which share of stiffness and
+damping a contact has where several spheres touch the same partner.
 
 The normal dashpot c = c_n √(2 E* a m) gives the declared restitution e when m is the mass that the contact moves. A
-sphere off the centre of its body moves less than the whole:
+sphere that is off the centre of its body moves less than the body's whole mass:
 
-    body_mass           m = m*, of whole bodies: as EDEM and LIGGGHTS. Too much damping off the centre, √N-fold too much
-                        where N spheres land flat.
+    body_mass           m = m* of the whole bodies, as in EDEM and LIGGGHTS. Too much damping off the centre, √N times
+                        too much where N spheres land flat.
     local_mass          1/m = Σ over both bodies of 1/m_b + q·I_b⁻¹ q,  q = r × n, r the arm from the centre of mass.
     local_mass_shared   the same, and contacts of one pair of bodies (or of a body and a wall) act as one. With overlaps
                         δ_j and normals n_j, S = Σ δ_j n_j, contact k has the share w = δ_k / max(δ_k, S·n_k) of
                         stiffness and damping. Its mass is taken at its own point where it is alone in its direction,
-                        at the mean of the points (weights δ_j) where all normals agree, and in between as they agree,
-                        (S·n_k)/Σδ_j. Shares change without a jump when a sphere touches or lets go.
-                        The energy account takes springs as if they did not share: it closes, but what it calls elastic
-                        is too much by the shares, and what it calls dissipated too little while bodies are pressed.
+                        at the mean of the points (weights δ_j) where all normals agree, and otherwise in between, by
+                        the agreement (S·n_k)/Σδ_j. Shares change continuously when a sphere touches or separates.
+                        The energy account treats springs as if they did not share: it closes, but while bodies are
+                        pressed together its elastic energy is too high and its dissipated energy too low.
 
-The locally reduced mass, and one contact per pair as the cure of too much stiffness and damping: Berry, Zhang & Haeri
-2023, Powder Technology 416:118209 (DOI 10.1016/j.powtec.2022.118209). The weights are ours.
+Source of the local mass, and of one contact per pair as the remedy for too much stiffness and damping: Berry, Zhang &
+Haeri 2023, Powder Technology 416:118209 (DOI 10.1016/j.powtec.2022.118209). The weights are our own.
 """
 
 from solver.backend import ti
@@ -25,12 +26,12 @@ from solver.engine.kernels.walls import from_patch, from_primitive
 from solver.engine.state import Vec3, Vec4
 
 BODY_MASS, LOCAL_MASS, SHARED = 0, 1, 2
-"""Places in ``contact_model.CLUMP_RULES``."""
+"""Indices in ``contact_model.CLUMP_RULES``."""
 
 
 @ti.func
 def meet_surface(s: ti.template(), w, k):
-    """Normal and overlap of entry ``k`` of the list, which is one with a surface: (nx, ny, nz, overlap)."""
+    """Normal and overlap [m] of entry ``k`` of the list, whose partner is a surface: (nx, ny, nz, overlap)."""
     i = s.contact.i[w, k]
     p = s.contact.j[w, k] - s.member.body.shape[1]
     hit = Vec4(0.0, 0.0, 0.0, 0.0)
@@ -52,7 +53,7 @@ def may_hold(s: ti.template(), w, k):
 def meet(s: ti.template(), w, k):
     """Normal from j to i and overlap [m] of entry ``k``: (nx, ny, nz, overlap); the overlap is ≤ 0 when apart.
 
-    The true distance is found only of surfaces that overlap or may hold each other.
+    Of two spheres that neither overlap nor may be held at a gap, only the sign of the overlap is right.
     """
     i, j = s.contact.i[w, k], s.contact.j[w, k]
     found = Vec4(0.0, 0.0, 0.0, -1.0)
@@ -74,7 +75,7 @@ def meet(s: ti.template(), w, k):
 
 @ti.func
 def lasts(s: ti.template(), w, k, overlap):
-    """Whether entry ``k`` may act: its surfaces overlap, or have touched and something may hold them still."""
+    """Whether entry ``k`` may act: its surfaces overlap, or have touched and an effect may still hold them."""
     acts = overlap > 0.0
     if ti.static(s.effects):
         acts = overlap > 0.0 or may_hold(s, w, k)
@@ -83,14 +84,14 @@ def lasts(s: ti.template(), w, k, overlap):
 
 @ti.func
 def pliancy(s: ti.template(), w, b, q):
-    """How easily the point of body ``b`` with the arm's product ``q`` = r × n [m] gives way along n [1/kg]."""
+    """Inverse effective mass [1/kg] of body ``b`` along n at the point with arm r; ``q`` = r × n [m]."""
     turned = s.body.rotation[w, b].transpose() @ q
     return s.body.inverse_mass[w, b] + turned.dot(s.body.inverse_inertia[w, b] * turned)
 
 
 @ti.func
 def local_mass(s: ti.template(), w, a, b, point, n):
-    """Mass [kg] that bodies ``a`` and ``b`` (a wall if negative) show at ``point`` along ``n``."""
+    """Effective mass [kg] of bodies ``a`` and ``b`` (a wall if negative) at ``point`` along ``n``."""
     inverse = pliancy(s, w, a, (point - s.body.position[w, a]).cross(n))
     if b >= 0:
         inverse += pliancy(s, w, b, (point - s.body.position[w, b]).cross(n))
@@ -105,10 +106,10 @@ def contact_point(s: ti.template(), w, i, n, overlap):
 
 @ti.func
 def find_leads(s: ti.template(), w):
-    """Note for every entry of the list the first one of its pair, where the sums over the pair stand."""
+    """Store for every entry the first entry of its pair (its lead), where the sums over the pair are kept."""
     for k in range(s.world.contacts[w]):
         a, b = s.contact.a[w, k], s.contact.b[w, k]
-        # What an earlier entry, or an earlier list, has left here says by itself whether it is of this pair.
+        # The value may be left over from another body or an earlier list; the checks below tell if it is of this pair.
         lead = k
         known = s.lead.wall[w, -1 - b] if b < 0 else s.lead.body[w, b]
         if known >= 0 and known < k:
@@ -123,7 +124,7 @@ def find_leads(s: ti.template(), w):
 
 @ti.func
 def sum_pairs(s: ti.template(), w, entries):
-    """Overlaps, normals and points of all touching contacts of each pair in the first ``entries`` of the live list."""
+    """Sum overlaps, normals and points of touching contacts, by pair, in the first ``entries`` of the live list."""
     for item in range(entries):
         lead = s.pair.lead[w, s.contact.live[w, item]]
         s.pair.overlap[w, lead] = 0.0
@@ -143,7 +144,7 @@ def sum_pairs(s: ti.template(), w, entries):
 
 @ti.func
 def shared_point(s: ti.template(), w, k, n, point):
-    """Where entry ``k`` takes its mass: at its own ``point`` [m], or nearer to the mean of those that push with it."""
+    """Point [m] at which entry ``k`` takes its mass: its own ``point``, or nearer to the mean of those of its pair."""
     lead, origin = s.pair.lead[w, k], s.body.position[w, s.contact.a[w, k]]
     total, found = s.pair.overlap[w, lead], point
     if total > 0.0:

@@ -1,10 +1,11 @@
 """The contact list of a world: pairs of member spheres, and spheres near a surface, that may touch soon.
 
-Bodies near each other are found by a hashed grid of their centres and by their bounding boxes, then sorted out member
-against box, then member against member, so the cost grows with the number of bodies. The list reaches as far as a pull
-may hold (``grip``) and the margins of both partners beyond; it holds while nothing has travelled further than its own
-margin. A margin is as wide as a body moves in ``AHEAD`` steps: one fast body does not make the list long for all the
-others. Tangential springs, and what effects keep of a contact, are carried over by merging two ordered lists.
+Bodies near each other are found with a hashed grid of their centres and with their bounding boxes; then members are
+tested against boxes and against members, so the cost grows with the number of bodies. The list contains pairs whose gap
+is at most the largest one at which a pull may hold (``grip``) plus the margins of both partners; it is valid until
+something has travelled further than its own margin. A margin is the distance that a body moves in ``AHEAD`` steps, so
+one fast body does not make the list long for all the others. Tangential springs, and what effects keep of a contact,
+are carried over by merging two ordered lists.
 """
 
 from solver.backend import ti
@@ -16,12 +17,12 @@ from solver.engine.state import Ints3, Vec3
 AHEAD = 60.0
 """Steps that a body at its present speed takes to use up its margin."""
 LEAST, MOST = 0.1, 1.5
-"""Limits of a margin, in skins: a body at rest may be hit, and a fast one needs no room for what is far away."""
+"""Limits of a margin, in skins: a body at rest may be hit, and a fast one need not list partners that are far away."""
 
 
 @ti.func
 def bound(s: ti.template(), w, b):
-    """Bounding box of one body, from its member spheres, none of which is listed yet."""
+    """Bounding box of one body, from its member spheres; marks all of them as not listed."""
     low, high = s.body.position[w, b], s.body.position[w, b]
     for m in range(s.body.first[w, b], s.body.first[w, b] + s.body.members[w, b]):
         s.member.listed[w, m] = 0
@@ -40,7 +41,7 @@ def bucket(s: ti.template(), c):
 
 @ti.func
 def fill_grid(s: ti.template(), w):
-    """Sort bodies into the hashed grid by their centres. Cells are as long as the largest body, grip and margins."""
+    """Sort bodies into the hashed grid by their centres. A cell is as long as the largest body, grip and margins."""
     for h in range(s.grid.bucket.shape[1]):
         s.grid.bucket[w, h] = -1
     for b in range(s.world.bodies[w]):
@@ -52,7 +53,7 @@ def fill_grid(s: ti.template(), w):
 
 @ti.func
 def find_near(s: ti.template(), w, a):
-    """Bodies after ``a`` whose bounding boxes are within both margins of its own, ascending; returns how many."""
+    """List bodies after ``a`` with bounding boxes within both margins of its own, ascending; returns how many."""
     reach = s.body.margin[w, a] + s.world.grip[w]
     low, high = s.body.low[w, a] - reach, s.body.high[w, a] + reach
     home = ti.floor(s.body.position[w, a] / s.world.cell[w], ti.i32)
@@ -68,7 +69,7 @@ def find_near(s: ti.template(), w, a):
                 if other_low[d] > high[d] or other_high[d] < low[d]:
                     apart = 1
             if apart == 0:
-                # Keep the list ascending; two cells may share a bucket, and a body come twice.
+                # Keep the list ascending; two cells may share a bucket, so a body may be found twice.
                 at = near
                 while at > 0 and s.body.near[w, at - 1] > b:
                     at -= 1
@@ -83,7 +84,7 @@ def find_near(s: ti.template(), w, a):
 
 @ti.func
 def bodily_margin(s: ti.template(), w, b):
-    """How far [m] the members of body ``b`` may travel until the list is built again."""
+    """Margin [m] of body ``b``: how far its members may travel before the list is rebuilt."""
     speed = s.body.velocity[w, b].norm() + s.body.spin[w, b].norm() * s.body.swing[w, b]
     skin = s.world.skin[w]
     return ti.min(ti.max(AHEAD * s.world.dt[w] * speed, LEAST * skin), MOST * skin)
@@ -123,7 +124,7 @@ def place_members(s: ti.template(), w, b, every: ti.template()):
 
 @ti.func
 def append(s: ti.template(), w, i, j, first, count):
-    """Add entry (i, j) with ``count`` triangles from ``first``; what follows from it comes with :func:`complete`."""
+    """Add entry (i, j) with ``count`` triangles from ``first``; :func:`complete` fills in the rest."""
     k = s.world.contacts[w]
     if k >= s.contact.i.shape[1]:
         s.world.overflow[w] = 1
@@ -137,7 +138,7 @@ def append(s: ti.template(), w, i, j, first, count):
 
 @ti.func
 def complete(s: ti.template(), w, k):
-    """Bodies, law, reduced radius and mass of entry ``k``."""
+    """Fill in bodies, law, reduced radius and reduced mass of entry ``k``."""
     i, j = s.contact.i[w, k], s.contact.j[w, k]
     a, b, radius = s.member.body[w, i], -1, s.member.radius[w, i]
     mass, kind = s.body.mass[w, a], 0
@@ -164,7 +165,7 @@ def complete(s: ti.template(), w, k):
 
 @ti.func
 def carry_over(s: ti.template(), w, n_old):
-    """Complete the new entries and give those that touched before their springs back."""
+    """Complete the new entries and restore the springs of those that touched before."""
     old = 0
     for k in range(s.world.contacts[w]):
         complete(s, w, k)
@@ -189,7 +190,7 @@ def carry_over(s: ti.template(), w, n_old):
 
 @ti.func
 def list_members(s: ti.template(), w, i, near):
-    """Entries of member ``i`` with members of the ``near`` bodies."""
+    """Add entries of member ``i`` with members of the ``near`` bodies in ``body.near``."""
     centre = s.member.centre[w, i]
     own = s.member.radius[w, i] + s.body.margin[w, s.member.body[w, i]] + s.world.grip[w]
     for k in range(near):
@@ -210,7 +211,7 @@ def list_members(s: ti.template(), w, i, near):
 
 @ti.func
 def list_primitives(s: ti.template(), w, i):
-    """Entries of member ``i`` with planes and revolved segments."""
+    """Add entries of member ``i`` with planes and revolved segments."""
     own = s.member.radius[w, i] + s.body.margin[w, s.member.body[w, i]] + s.world.grip[w]
     for p in range(s.world.primitives[w]):
         wall = s.surface.wall[w, p]
@@ -259,7 +260,7 @@ def collect_triangles(s: ti.template(), w, k, i):
 
 @ti.func
 def list_patches(s: ti.template(), w, i):
-    """Entries of member ``i`` with the patches of meshes."""
+    """Add entries of member ``i`` with the patches of meshes."""
     for k in range(s.world.walls[w]):
         if s.wall.active[w, k] == 1 and s.wall.cell[w, k] > 0.0:
             begin = s.world.candidates[w]
@@ -282,7 +283,7 @@ def rebuild(s: ti.template(), w):
     s.world.stirred[w] = 1
     for k in range(s.world.walls[w]):
         s.wall.travel[w, k] = 0.0
-        # One that stands still has the list built as soon as it is set in motion.
+        # A wall at rest needs no margin: the list is rebuilt as soon as the wall is set in motion.
         s.wall.margin[w, k] = 0.5 * s.world.skin[w] * s.wall.moving[w, k]
     for b in range(s.world.bodies[w]):
         s.body.listed[w, b] = 0
@@ -292,11 +293,11 @@ def rebuild(s: ti.template(), w):
             place_members(s, w, b, True)
             bound(s, w, b)
     fill_grid(s, w)
-    # Entries that were lost once have let bodies through each other, however well the next list fits.
+    # Once entries were lost, bodies may have passed through each other, so the flag stays set even if this list fits.
     overflowed = s.world.overflow[w]
     for narrow in range(2):
         if narrow == 0 or s.world.overflow[w] == 1:
-            # A dense bed that moves fast as a whole may not fit; with the least margins it is built more often.
+            # A dense bed that moves fast as a whole may not fit; with the least margins it is rebuilt more often.
             s.world.overflow[w] = 0
             s.world.contacts[w] = 0
             s.world.candidates[w] = 0

@@ -1,9 +1,9 @@
-"""Sleeping bodies: what lies still costs nothing until the forces on it change.
+"""Sleeping bodies: a body at rest takes no computing time until the forces on it change.
 
 A body that has been slower than ``sleep_speed`` (√(2 kinetic energy / mass)) for ``sleep_time`` and whose forces are in
-balance falls asleep: it stands still, and contacts among sleepers and resting walls are left out, their forces summed
-once. It wakes when the balance is lost, for instance by the push of a body that is awake. Each body sleeps and wakes
-by itself, at steps that do not depend on how they are cut into launches.
+balance falls asleep: it is fixed, and contacts among sleeping bodies and resting walls are skipped, their forces summed
+once. It wakes when the balance is lost, for instance when an awake body pushes it. Each body falls asleep and wakes on
+its own, at steps that do not depend on how the run is divided into launches.
 """
 
 from solver.backend import ti
@@ -18,7 +18,7 @@ WAKE = 0.1
 
 @ti.func
 def imbalance(s: ti.template(), w, b, force, torque):
-    """Net force, or net torque over the reach, as a fraction of the weight: the larger of the two."""
+    """The larger of net force and net torque divided by the reach, as a fraction of the weight."""
     mass, g = s.body.mass[w, b], s.world.gravity[w]
     net = (force + mass * g).norm()
     return ti.max(net, torque.norm() / s.body.reach[w, b]) / (mass * g.norm())
@@ -26,7 +26,7 @@ def imbalance(s: ti.template(), w, b, force, torque):
 
 @ti.func
 def fall_asleep(s: ti.template(), w, b):
-    """Let body ``b`` sleep if it has been still for long enough; called before its force is cleared."""
+    """Let body ``b`` sleep if it is balanced and has been slow for long enough; called before its force is cleared."""
     energy = energy_per_mass(s, w, b)
     if energy > s.world.sleep_speed[w] ** 2:
         s.body.quiet[w, b] = 0.0
@@ -46,7 +46,7 @@ def fall_asleep(s: ti.template(), w, b):
 
 @ti.func
 def rouse(s: ti.template(), w, b):
-    """Body ``b`` is awake from the next step on."""
+    """Wake body ``b`` from the next step on."""
     s.body.asleep[w, b] = 0
     s.body.quiet[w, b] = 0.0
     s.world.stirred[w] = 1
@@ -62,7 +62,7 @@ def rouse_all(s: ti.template(), w):
 
 @ti.func
 def watch(s: ti.template(), w, b):
-    """Wake sleeper ``b`` if what holds it and what pushes it are out of balance; clears its live force."""
+    """Wake sleeping body ``b`` if its held and live forces are out of balance; clears its live force."""
     force, torque = s.body.force[w, b], s.body.torque[w, b]
     s.body.force[w, b] = Vec3(0.0, 0.0, 0.0)
     s.body.torque[w, b] = Vec3(0.0, 0.0, 0.0)
@@ -72,7 +72,7 @@ def watch(s: ti.template(), w, b):
 
 @ti.func
 def list_bodies(s: ti.template(), w):
-    """List the bodies that are awake; sleepers are held by nothing yet."""
+    """List the bodies that are awake, and clear the held forces of all."""
     awake = 0
     for b in range(s.world.bodies[w]):
         if s.body.alive[w, b] == 1:
@@ -87,7 +87,7 @@ def list_bodies(s: ti.template(), w):
 
 @ti.func
 def list_entries(s: ti.template(), w):
-    """List the entries with a body awake or a moving wall, ascending, and the others after them."""
+    """List the entries with an awake body or a moving wall, ascending, and the others after them."""
     live, rest = 0, s.world.contacts[w]
     for k in range(s.world.contacts[w]):
         a, b = s.contact.a[w, k], s.contact.b[w, k]
@@ -110,7 +110,7 @@ def list_entries(s: ti.template(), w):
 
 @ti.func
 def list_border(s: ti.template(), w):
-    """List the sleepers that something awake may push; the others wake here if they have lost what they lay on."""
+    """List sleeping bodies that an awake body or a moving wall may push; wake others that have lost their support."""
     border = 0
     for b in range(s.world.bodies[w]):
         if s.body.alive[w, b] == 1 and s.body.asleep[w, b] == 1:

@@ -1,11 +1,11 @@
-"""What goes between NumPy and the arrays of a world, one small kernel per table or group of fields.
+"""Transfer between NumPy and the arrays of a world, one small kernel per table or group of fields.
 
     load_…              a scene as tables → the arrays of an empty world
     read_…              the arrays of a world → rows of numbers
     pack…, unpack…      fields of a world → one row of numbers, and back
 
-Of a group that is packed, ``width`` is the number of columns that an entry takes, ``first`` the number in the row where
-the group begins.
+For a packed group, ``width`` is the number of columns per entry, and ``first`` the index in the row at which the group
+begins.
 """
 
 from solver.backend import serial, ti
@@ -22,13 +22,13 @@ SETTINGS = (
     *("dt", "gravity", "skin", "cell", "sleep_speed", "sleep_time", "domain", "outlet", "inlet_radius"),
     *("clump_rule", "tangential_law", "tangential_dashpot"),
 )
-"""What a world is set up with: fields of ``state.WORLD``."""
+"""Fields of ``state.WORLD`` with which a world is set up."""
 Settings = ti.types.struct(**{name: WORLD[name] for name in SETTINGS})
 
 
 @ti.func
 def triple(table: ti.template(), row, column):
-    """Three neighbouring cells of a row as a vector."""
+    """Three adjacent columns of a row as a vector."""
     return Vec3(table[row, column], table[row, column + 1], table[row, column + 2])
 
 
@@ -70,7 +70,7 @@ def load_world(s: ti.template(), w: ti.i32, settings: Settings):
 
 @ti.kernel
 def load_bodies(s: ti.template(), w: ti.i32, numbers: Table, places: IntTable, spheres: Table, owner: IntTable):
-    """All bodies that will enter, columns as in ``tables.BodyTables``: numbers, places, spheres (x y z r), owner."""
+    """Load all bodies that will enter; columns of ``tables.BodyTables``: numbers, places, spheres (x y z r), owner."""
     s.world.loaded[w] = numbers.shape[0]
     ti.loop_config(serialize=ti.static(serial()))
     for b in range(numbers.shape[0]):
@@ -96,12 +96,12 @@ def load_bodies(s: ti.template(), w: ti.i32, numbers: Table, places: IntTable, s
         s.member.local[w, m] = triple(spheres, m, 0)
         s.member.radius[w, m] = spheres[m, 3]
         s.member.body[w, m] = owner[m, 0]
-        ti.atomic_max(s.body.swing[w, owner[m, 0]], s.member.local[w, m].norm())  # members of a body run at once
+        ti.atomic_max(s.body.swing[w, owner[m, 0]], s.member.local[w, m].norm())  # members of a body run in parallel
 
 
 @ti.kernel
 def load_walls(s: ti.template(), w: ti.i32, poses: Table, marks: IntTable, grids: Table, cells: IntTable):
-    """Walls at rest. poses: origin, quaternion; marks: kind, active; grids: low, cell; cells: counts (3), first."""
+    """Walls, at rest. poses: origin, quaternion; marks: kind, active; grids: low, cell; cells: counts (3), first."""
     s.world.walls[w] = poses.shape[0]
     ti.loop_config(serialize=ti.static(serial()))
     for k in range(poses.shape[0]):
@@ -126,7 +126,7 @@ def load_walls(s: ti.template(), w: ti.i32, poses: Table, marks: IntTable, grids
 
 @ti.kernel
 def load_surfaces(s: ti.template(), w: ti.i32, geometry: Table, marks: IntTable, primitives: ti.i32):
-    """What spheres can touch, the ``primitives`` first; marks: shape, wall."""
+    """Load the surfaces that spheres can touch, the ``primitives`` first; marks: shape, wall."""
     s.world.primitives[w] = primitives
     ti.loop_config(serialize=ti.static(serial()))
     for p in range(geometry.shape[0]):
@@ -137,7 +137,7 @@ def load_surfaces(s: ti.template(), w: ti.i32, geometry: Table, marks: IntTable,
 
 @ti.kernel
 def load_triangles(s: ti.template(), w: ti.i32, corners: Table, guards: Table, marks: IntTable):
-    """Triangles of all meshes. corners: a, b, c; guards: a row per edge; marks: surface, edges (3), corners (3)."""
+    """Load triangles of all meshes. corners: a, b, c; guards: row per edge; marks: surface, edges (3), corners (3)."""
     ti.loop_config(serialize=ti.static(serial()))
     for t in range(corners.shape[0]):
         s.triangle.a[w, t] = triple(corners, t, 0)
@@ -152,7 +152,7 @@ def load_triangles(s: ti.template(), w: ti.i32, corners: Table, guards: Table, m
 
 @ti.kernel
 def load_cells(s: ti.template(), w: ti.i32, first: IntRow, items: IntRow):
-    """Cells of all meshes' grids: where each one's triangles begin (and where the last ones end), and the triangles."""
+    """Load cells of all meshes' grids: where the triangles of each begin (and those of the last end); the triangles."""
     ti.loop_config(serialize=ti.static(serial()))
     for c in range(first.shape[0]):
         s.mesh_cell.first[w, c] = first[c]
@@ -238,7 +238,7 @@ def pack(fields: ti.template(), w: ti.i32, entries: ti.i32, width: ti.i32, first
 
 @ti.kernel
 def unpack(fields: ti.template(), w: ti.i32, entries: ti.i32, width: ti.i32, first: ti.i32, row: Row):
-    """Take back what :func:`pack` wrote."""
+    """Restore what :func:`pack` wrote."""
     ti.loop_config(serialize=ti.static(serial()))
     for k in range(entries):
         at = first + k * width
@@ -257,7 +257,7 @@ def unpack(fields: ti.template(), w: ti.i32, entries: ti.i32, width: ti.i32, fir
 
 @ti.kernel
 def pack_world(fields: ti.template(), w: ti.i32, row: Row):
-    """Write what a world has once (``fields`` of shape (worlds,)) into the beginning of ``row``."""
+    """Write the fields that exist once per world (``fields`` of shape (worlds,)) to the beginning of ``row``."""
     ti.loop_config(serialize=ti.static(serial()))
     for world in range(w, w + 1):
         at = 0
@@ -273,7 +273,7 @@ def pack_world(fields: ti.template(), w: ti.i32, row: Row):
 
 @ti.kernel
 def unpack_world(fields: ti.template(), w: ti.i32, row: Row):
-    """Take back what :func:`pack_world` wrote."""
+    """Restore what :func:`pack_world` wrote."""
     ti.loop_config(serialize=ti.static(serial()))
     for world in range(w, w + 1):
         at = 0
@@ -298,7 +298,7 @@ def pack_memory(number: ti.template(), w: ti.i32, entries: ti.i32, first: ti.i32
 
 @ti.kernel
 def unpack_memory(number: ti.template(), w: ti.i32, entries: ti.i32, first: ti.i32, row: Row):
-    """Take back what :func:`pack_memory` wrote."""
+    """Restore what :func:`pack_memory` wrote."""
     ti.loop_config(serialize=ti.static(serial()))
     for k in range(entries):
         for column in range(number.shape[2]):

@@ -1,8 +1,8 @@
-"""Walls: how they move, and how far a member sphere is from what it can touch of them.
+"""Walls: how they move, and how far a member sphere is from their surfaces.
 
 A triangle mesh acts through smooth patches (``solver/engine/tables.py``): one contact per sphere and patch, at the
 nearest point of the patch, so a sphere that rolls from facet to facet keeps its spring and feels no edge. Where two
-patches meet in an edge, only one of them answers.
+patches meet in an edge, only one of them responds.
 """
 
 from solver.backend import ti
@@ -10,12 +10,12 @@ from solver.engine.kernels.geometry import nearest_on_revolved, nearest_on_trian
 from solver.engine.state import Vec3, Vec4
 
 APART = 1e30
-"""A distance [m] for "does not touch"."""
+"""Distance [m] that means "does not touch"."""
 
 
 @ti.func
 def clear_walls(s: ti.template(), w):
-    """Begin the forces on the walls with those of the sleepers, which are summed anew when who is awake has changed."""
+    """Reset the forces on walls to those of sleeping bodies, which are summed anew after a body woke or fell asleep."""
     for k in range(s.world.walls[w]):
         if s.world.stirred[w] == 1:
             s.wall.held[w, k] = Vec3(0.0, 0.0, 0.0)
@@ -31,7 +31,7 @@ def move_walls(s: ti.template(), w):
         if s.wall.moving[w, k] == 1:
             dt, omega = s.world.dt[w], s.wall.omega[w, k]
             s.wall.origin[w, k] = s.wall.origin[w, k] + dt * s.wall.velocity[w, k]
-            # The spin of ``turned`` is in the local frame.
+            # ``turned`` takes the spin in the local frame.
             local = s.wall.turn[w, k].transpose() @ omega
             s.wall.quaternion[w, k] = turned(s.wall.quaternion[w, k], local, dt)
             s.wall.turn[w, k] = rotation(s.wall.quaternion[w, k])
@@ -68,13 +68,13 @@ def from_primitive(s: ti.template(), w, p, point):
 
 @ti.func
 def answers(s: ti.template(), w, t, place, gap):
-    """1 if triangle ``t`` has to answer for a nearest point at ``place``; ``gap`` leads from there to the sphere."""
+    """1 if triangle ``t`` responds at a nearest point at ``place``; ``gap`` leads from there to the sphere's centre."""
     mine = 1
     for e in ti.static(range(3)):
         if place == 1 + e:
             duty = s.triangle.edges[w, t][e]
             guard = Vec3(s.triangle.guards[w, t][e, 0], s.triangle.guards[w, t][e, 1], s.triangle.guards[w, t][e, 2])
-            # Above the neighbour's face it is the neighbour's face that is nearest.
+            # Above the neighbour's face, that face is nearest and responds.
             if duty == 1 or (duty == 2 and guard.dot(gap) > 0.0):
                 mine = 0
         if place == 4 + e and s.triangle.corners[w, t][e] == 1:
