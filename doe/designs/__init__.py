@@ -1,5 +1,5 @@
 """Designs: which combinations of coded factor levels are run. One file per family (``design.py`` says how to add one);
-a design is an array (rows, factors), of integers where its levels are.
+a design is an array of shape (rows, factors), of integers if its levels are integers.
 """
 
 from doe.designs.box_behnken import BoxBehnken, box_behnken

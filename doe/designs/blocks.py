@@ -1,11 +1,11 @@
 """Which products of factor columns split a two-level design into blocks (days, batches, operators).
 
-What differs between blocks then takes nothing from the effects that matter. A run goes into a block by the signs of q
-products (block generators). These and their products with each other, 2^q - 1 block contrasts for 2^q blocks, cannot be
-told from the blocks; neither can the effects that share a column with one. A column of a design with 2^m runs is a
-number 1 … 2^m - 1 whose bits are the basic factors in its product, so that the product of two columns is their
-exclusive or. The generators are searched: no main effect, then the fewest interactions of two, then of three and of
-four. Source: Montgomery 2017, Design and Analysis of Experiments, ch. 7; Box, Hunter and Hunter 2005, Statistics for
+Differences between blocks then do not bias the effects that matter. The signs of q products (block generators) assign
+each run to a block. The generators and all their products, 2^q - 1 block contrasts for 2^q blocks, are confounded with
+the blocks, and so is every effect that is aliased with one of them. A column of a design with 2^m runs is a number
+1 … 2^m - 1 whose bits are the basic factors in its product, so that the product of two columns is the exclusive or of
+their numbers. The search confounds no main effect, then the fewest interactions of two, of three and of four factors.
+Source: Montgomery 2017, Design and Analysis of Experiments, ch. 7; Box, Hunter and Hunter 2005, Statistics for
 Experimenters, ch. 5.
 """
 
@@ -21,14 +21,14 @@ from doe.errors import StatisticsError
 
 IntArray = npt.NDArray[np.int64]
 MOST_TRIALS = 30_000
-"""Columns that are tried: all up to 32 runs, of more the most promising ones first."""
+"""Columns tried in one search: all of them with up to 32 runs; with more runs, the most promising ones come first."""
 
 
 def block_generators(columns: Sequence[int], blocks: int, clear: int = 1) -> tuple[int, ...]:
-    """Return the q columns whose signs split a design into `blocks` = 2^q blocks of one size.
+    """Return the q columns whose signs split a design into `blocks` = 2^q blocks of equal size.
 
-    columns: of the factors. clear: effects of up to so many factors stay apart from the blocks, 1 or 2.
-    Raises StatisticsError, which names the numbers of blocks that there are, where there is no such split.
+    columns: those of the factors. clear: effects of up to this number of factors are kept clear of the blocks, 1 or 2.
+    Raises StatisticsError, which lists the possible numbers of blocks, if there is no such split.
     """
     basic = max(columns).bit_length()
     lost = _effects_on_columns(columns, basic)
@@ -45,14 +45,14 @@ def block_generators(columns: Sequence[int], blocks: int, clear: int = 1) -> tup
 
 
 def possible_blocks(columns: Sequence[int], clear: int = 1) -> tuple[int, ...]:
-    """Return the numbers of blocks that `block_generators` has a split for."""
+    """Return the numbers of blocks for which `block_generators` finds a split."""
     basic = max(columns).bit_length()
     lost = _effects_on_columns(columns, basic)
     return tuple(2**q for q in range(1, basic) if _search(lost, q, clear, first=True) is not None)
 
 
 def spanned(generators: Sequence[int]) -> tuple[int, ...]:
-    """Return every product of the generators but the empty one: the block contrasts."""
+    """Return the block contrasts: every product of the generators except the empty one."""
     span = [0]
     for generator in generators:
         span += [generator ^ one for one in span]
@@ -60,7 +60,7 @@ def spanned(generators: Sequence[int]) -> tuple[int, ...]:
 
 
 def _effects_on_columns(columns: Sequence[int], basic: int) -> IntArray:
-    """Return how many effects of one to four factors stand on each column, shape (2^basic, 4)."""
+    """Return the number of effects of one to four factors in each column, shape (2^basic, 4)."""
     found = np.zeros((2**basic, 4), dtype=np.int64)
     for size in (1, 2, 3, 4):
         for group in combinations(columns, size):
@@ -72,9 +72,10 @@ def _effects_on_columns(columns: Sequence[int], basic: int) -> IntArray:
 
 
 def _search(lost: IntArray, q: int, clear: int, first: bool) -> tuple[int, ...] | None:
-    """Return the best q generators, or the first that are allowed; None where no q are.
+    """Return the best q generators, or the first allowed ones; None if there are none.
 
-    Every space of contrasts is visited once: by generators of rising rank, each the first of what it adds.
+    Every set of contrasts is visited once: a generator must have a higher rank than those before it and the lowest rank
+    of the contrasts that it adds.
     """
     allowed = np.asarray(lost[:, :clear].sum(axis=1) == 0)
     free = [column for column in np.flatnonzero(allowed).tolist() if column]

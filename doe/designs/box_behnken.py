@@ -2,13 +2,13 @@
 
 Source: Box and Behnken 1960, Technometrics 2:455. For 3, 4 and 5 factors the design is the 2 x 2 factorial on
 every pair of factors with the others at zero, plus centre runs. For 6 and 7 factors it is the 2 x 2 x 2 factorial
-on the published triples: for 7 the balanced blocks in which every pair stands once, for 6 the partially balanced
-ones in which every factor stands three times.
+on the published triples: for 7 a balanced incomplete block design, in which every pair occurs once, for 6 a
+partially balanced one, in which every factor occurs three times.
 
-Orthogonal blocks, by the same source: with 4 factors three, each of two pairs that share no factor; with 5 two, each of
-pairs that form a ring; with 6 and 7 two, the halves of every 2 x 2 x 2 by the sign of its product. Every factor is then
-moved equally often in every block, and no product leans to one. With 3 factors there are none: a block would hold part
-of a 2 x 2 factorial, whose interaction would be its effect.
+Orthogonal blocks (same source): 4 factors have three, each with two pairs that share no factor; 5 have two, each with
+pairs that form a ring; 6 and 7 have two, the halves of every 2 x 2 x 2 by the sign of the product of its levels. Every
+factor then varies equally often in every block, and every two-factor product sums to zero in each. With 3 factors there
+are none: a block would hold part of a 2 x 2 factorial, whose interaction would be confounded with the block.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ TRIPLES = {
     6: ((0, 1, 3), (1, 2, 4), (2, 3, 5), (0, 3, 4), (1, 4, 5), (0, 2, 5)),
     7: ((3, 4, 5), (0, 5, 6), (1, 4, 6), (0, 1, 3), (2, 3, 6), (0, 2, 4), (1, 2, 5)),
 }
-"""Number of factors → the factors that are moved together."""
+"""Number of factors → indices of the factors that vary together."""
 CENTRE_RUNS = 5
-"""Where nothing else is asked for."""
+"""Default number of centre runs."""
 BLOCKS = {4: 3, 5: 2, 6: 2, 7: 2}
-"""Number of factors → orthogonal blocks."""
+"""Number of factors → number of orthogonal blocks."""
 BLOCK_OF_PAIR = {4: (0, 1, 2, 2, 1, 0), 5: (0, 0, 1, 1, 1, 1, 0, 0, 1, 0)}
-"""Number of factors → block of each pair AB, AC, … in turn."""
+"""Number of factors → block of each pair, in the order AB, AC, …."""
 CENTRE_IN_BLOCKS = {4: 1, 5: 3, 6: 3, 7: 3}
-"""Centre runs of each block where nothing else is asked for."""
+"""Number of factors → default number of centre runs in each block."""
 
 
 def box_behnken(factors: int = 3, centre: int = CENTRE_RUNS) -> npt.NDArray[np.int64]:
     """Return the design as levels -1, 0, +1, shape (edges + centre, factors); centre runs come last.
 
     12, 24, 40, 48 and 56 edge points for 3 to 7 factors. Raises StatisticsError for factors outside 3..7 or
-    centre < 1 (without a centre run the squares are singular).
+    centre < 1 (without a centre run the squares add up to a constant).
     """
     if factors not in range(3, 8):
         raise StatisticsError(f"factors = {factors}: Box–Behnken designs are made for 3 to 7 factors")
@@ -58,7 +58,7 @@ def box_behnken(factors: int = 3, centre: int = CENTRE_RUNS) -> npt.NDArray[np.i
 def block_of_edges(factors: int, blocks: int) -> npt.NDArray[np.int64]:
     """Return the block, from 0, of each edge point of `box_behnken`, shape (edges,).
 
-    Raises StatisticsError, with the number that there is, for another number of blocks than that of the factors.
+    Raises StatisticsError, which names the allowed number of blocks, for any other number.
     """
     if blocks != BLOCKS.get(factors):
         allowed = BLOCKS.get(factors, "none, as no number of blocks is orthogonal")
@@ -78,7 +78,7 @@ class BoxBehnken(Design):
     options = ("centre", "blocks")
 
     def points(self, factors: int, options: DesignOptions) -> Points:
-        """Edges, then centre runs, with blocks as many in each."""
+        """Edge points, then centre runs; with blocks, each block has the same number of centre runs."""
         if options.blocks is None:
             design = box_behnken(factors, CENTRE_RUNS if options.centre is None else options.centre)
             return Points(design.astype(np.float64))

@@ -1,12 +1,12 @@
 """Central composite designs: a two-level factorial, two axial points per factor at ±alpha, and centre runs.
 
 Source: Box and Wilson 1951, J. Roy. Stat. Soc. B 13:1; Box and Hunter 1957, Ann. Math. Stat. 28:195 (rotatability:
-alpha = F^(1/4) with F factorial points). From 5 factors on the factorial part is the half fraction of resolution V or
-higher, in which no main effect or interaction of two is confused with another.
+alpha = F^(1/4) with F factorial points). From 5 factors on, the factorial part is the half fraction of resolution V or
+higher, in which no main effect or two-factor interaction is aliased with another.
 
-Orthogonal blocks (Box and Hunter 1957, sec. 8): the factorial part in one block or, by products of three factors and
-more, in 2, 4, …, and one of the axial points. With n_F centre runs among the F factorial points and n_A among the 2 k
-axial ones, the squares are clear of the blocks where alpha² = F (2 k + n_A)/(2 (F + n_F)).
+Orthogonal blocks (Box and Hunter 1957, sec. 8): the factorial part is one block or is split by interactions of three or
+more factors into 2, 4, … blocks; the axial points are one more block. With n_F centre runs among the F factorial points
+and n_A among the 2 k axial ones, the squares are orthogonal to the blocks if alpha² = F (2 k + n_A)/(2 (F + n_F)).
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ IntArray = npt.NDArray[np.int64]
 FACTORS = range(2, 8)
 HALVED_FROM = 5
 CENTRE_RUNS = 5
-"""Where nothing else is asked for."""
+"""Default number of centre runs without blocks."""
 CENTRE_IN_BLOCKS = {2: (3, 3), 3: (4, 2), 4: (4, 2), 5: (6, 1), 6: (8, 2), 7: (8, 4)}
-"""Factors → centre runs of all factorial blocks and of the axial one, where nothing else is asked for: those with which
-alpha is that of rotatability (2, 4, 5 and 7 factors) or within 3 % of it."""
+"""Factors → default number of centre runs, in all factorial blocks together and in the axial one: with them, alpha is
+that of rotatability (2, 4, 5 and 7 factors) or within 3 % of it."""
 
 
 def central_composite(factors: int, centre: int = CENTRE_RUNS, alpha: Alpha = "rotatable") -> FloatArray:
     """Return the design in coded units, shape (F + 2 factors + centre, factors): factorial, axial, centre points.
 
     alpha: "rotatable" puts the axial points at F^(1/4), outside the cube; "face-centred" on its faces; "inscribed" is
-    the rotatable design shrunk into the cube, its axial points at ±1.
+    the rotatable design scaled to fit into the cube, with its axial points at ±1.
     Raises StatisticsError for factors outside 2..7, centre < 1 or another alpha.
     """
     if factors not in FACTORS:
@@ -51,11 +51,12 @@ def central_composite(factors: int, centre: int = CENTRE_RUNS, alpha: Alpha = "r
 def central_composite_blocks(
     factors: int, blocks: int, centre: int | None = None, alpha: Alpha = "rotatable"
 ) -> tuple[FloatArray, IntArray]:
-    """Return the design as `central_composite` does, and the block of each row, from 0: factorial blocks, then the
-    axial one, which is the last.
+    """Return the design as `central_composite` does, and the block of each row, counted from 0: the factorial blocks
+    come first, the axial block is the last.
 
-    centre: runs in each block; None: as many as bring alpha near to rotatability. alpha: "inscribed" shrinks the design
-    into the cube. Raises StatisticsError for numbers of blocks that are not orthogonal, or face-centred axial points.
+    centre: centre runs in each block; None: as many as bring alpha near that of rotatability. alpha: "inscribed" scales
+    the design to fit into the cube. Raises StatisticsError if the blocks cannot be orthogonal, or for face-centred
+    axial points.
     """
     if factors not in FACTORS:
         raise StatisticsError(f"factors = {factors}: central composite designs are made for 2 to 7 factors")

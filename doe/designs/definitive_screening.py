@@ -1,10 +1,10 @@
-"""Definitive screening designs: three levels, main effects clear of every interaction of two and of every square.
+"""Definitive screening designs: three levels, main effects clear of all two-factor interactions and squares.
 
-Source: Jones and Nachtsheim 2011, J. Quality Technology 43:1, doi:10.1080/00224065.2011.11917841; by conference
+Source: Jones and Nachtsheim 2011, J. Quality Technology 43:1, doi:10.1080/00224065.2011.11917841; from conference
 matrices as in Xiao, Lin and Bai 2012, J. Quality Technology 44:2, doi:10.1080/00224065.2012.11917877: the rows of C
-(m × m, zero diagonal, C'C = (m − 1) I), their mirror images, and a run in the middle, 2 m + 1 in all. C is Paley's,
-of order q + 1 for an odd q that is a prime or the square of one. Where m is more than the number of factors, the
-columns left over carry none; they serve as error (Jones and Nachtsheim 2017, Technometrics 59:319).
+(m × m, zero diagonal, C'C = (m − 1) I), their mirror images, and a centre run, 2 m + 1 in all. C is Paley's, of
+order q + 1 for an odd q that is a prime or the square of one. If m is larger than the number of factors, the spare
+columns have no factor; they estimate the error (Jones and Nachtsheim 2017, Technometrics 59:319).
 """
 
 from __future__ import annotations
@@ -19,15 +19,16 @@ from doe.errors import StatisticsError
 
 IntArray = npt.NDArray[np.int64]
 ORDERS = {4: 3, 6: 5, 8: 7, 10: 9, 12: 11, 14: 13, 18: 17, 20: 19, 24: 23, 26: 25, 30: 29}
-"""Order of a conference matrix → q. None exists of order 22; Paley's construction gives none of 16 and 28 here."""
+"""Order of a conference matrix → q. None exists of order 22; for 16 and 28, q is no prime and no square of a prime."""
 CENTRE_RUNS = 1
-"""Where nothing else is asked for."""
+"""Default number of centre runs."""
 
 
 def definitive_screening(factors: int, centre: int = CENTRE_RUNS) -> IntArray:
     """Return the design as levels -1, 0, +1, shape (2 m + centre, m): m ≥ factors columns, centre runs last.
 
-    Raises StatisticsError for factors outside 3..30 or centre < 1 (without it the squares are not apart from the mean).
+    Raises StatisticsError for factors outside 3..30 or centre < 1 (without a centre run the m squares add up to a
+    constant).
     """
     if not 3 <= factors <= max(ORDERS):
         raise StatisticsError(
@@ -40,10 +41,10 @@ def definitive_screening(factors: int, centre: int = CENTRE_RUNS) -> IntArray:
 
 
 def conference_matrix(order: int) -> IntArray:
-    """Return Paley's conference matrix of an order of ``ORDERS``, shape (order, order).
+    """Return Paley's conference matrix for an order in ``ORDERS``, shape (order, order).
 
     Q_ij = χ(a_i − a_j) over the q elements of the field, bordered by a row and a column of ones (of opposite signs
-    where q is 3 modulo 4, since Q is skew then).
+    if q is 3 modulo 4, since Q is then skew-symmetric).
     """
     q = ORDERS[order]
     elements, minus, is_square = _field(q)
@@ -61,7 +62,9 @@ Element = tuple[int, int]
 
 
 def _field(q: int) -> tuple[list[Element], Callable[[Element, Element], Element], Callable[[Element], bool]]:
-    """Elements x + y √n of the field of q = p or p², their difference, and whether one is a square; n: no square."""
+    """Return the elements x + y √n of the field of order q = p or p² (n: not a square modulo p), a function for the
+    difference of two elements, and one for whether an element is a square.
+    """
     root = round(q**0.5)
     p = root if root * root == q else q
     squares = {x * x % p for x in range(p)}
@@ -72,7 +75,7 @@ def _field(q: int) -> tuple[list[Element], Callable[[Element, Element], Element]
 
 
 class DefinitiveScreening(Design):
-    """2 m + 1 runs of three levels for k ≤ m factors."""
+    """2 m + 1 runs at three levels for k ≤ m factors."""
 
     name = "definitive-screening"
     title = "definitive screening"

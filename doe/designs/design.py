@@ -1,7 +1,8 @@
-"""What a design family is to everything outside it: a name, the options that it takes, and the points that it makes.
+"""The interface of a design family: its name, the options that it accepts, and the points that it returns.
 
-To add one: a file with a class of :class:`Design` and a line in ``DESIGNS``, or an entry point ``design.NAME`` of a
-package of one's own (``solver/plugins.py``). The command line, the page and study files list from there.
+To add one, write a subclass of :class:`Design` in a file of its own and list it in ``DESIGNS``, or declare an entry
+point ``design.NAME`` in your own package (``solver/plugins.py``). The command line, the page and study files take their
+lists of designs from there.
 """
 
 from __future__ import annotations
@@ -21,44 +22,44 @@ Alpha = Literal["rotatable", "face-centred", "inscribed"]
 ALPHAS: tuple[str, ...] = get_args(Alpha)
 Model = Literal["linear", "interactions", "quadratic"]
 LETTERS = "ABCDEFGHJKLMNOPQRSTUVWXYZ"
-"""Without I, which is the identity."""
+"""Without I, which stands for the identity."""
 
 
 @dataclass(frozen=True)
 class DesignOptions(Record):
-    """What may be asked of a design; a family takes those that it names. None, 0, (), False: as usual for it."""
+    """Options of designs; a family accepts those in its ``options``. None, 0, () and False mean its default."""
 
     runs: int | None = None
-    """Size of a table, or number of points."""
+    """Number of rows of a table, or number of points."""
     centre: int | None = None
-    """Runs with every factor in the middle."""
+    """Number of centre runs, with every factor in the middle of its range."""
     fold: bool = False
     """Whether the mirror image of every row is run too."""
     generators: tuple[str, ...] = ()
-    """Of a fraction, such as "E=ABC"."""
+    """Generators of a fraction, such as "E=ABC"."""
     fraction: int = 0
-    """P of the fraction 2^(k − P) by the usual generators."""
+    """P of the fraction 2^(k − P) with the standard generators."""
     alpha: Alpha = "rotatable"
-    """Where the axial points stand."""
+    """Position of the axial points."""
     blocks: int | None = None
-    """Orthogonal blocks of rows: days, batches, operators; with them, ``centre`` is of each block."""
+    """Number of orthogonal blocks of rows (days, batches, operators); ``centre`` is then the number in each block."""
     model: Model = "quadratic"
-    """Whose terms an optimal design tells best."""
+    """Model for which an optimal design is computed."""
     constraints: tuple[tuple[float, ...], ...] = ()
-    """Within which the runs stay: a_1, …, a_k, b of a_1 x_1 + … <= b in coded units."""
+    """Constraints on the runs: rows (a_1, …, a_k, b) of a_1 x_1 + … <= b in coded units."""
     levels: tuple[int, ...] = ()
-    """Number of names of each factor that is no number; 0 of one that is. Empty: all are."""
+    """Number of names of each categorical factor, 0 for a numeric factor. Empty: all factors are numeric."""
     kept: tuple[tuple[float, ...], ...] = ()
-    """Coded levels of finished runs, beside which others are looked for."""
+    """Coded levels of finished runs to which new runs are added."""
     lattice: int | None = None
-    """Steps of a share in a mixture."""
+    """Degree of the simplex lattice of a mixture: number of steps of a share. None: the simplex centroid."""
     nonregular: bool = False
-    """Whether no main effect may be wholly confused with an interaction of two, where a regular table is as usual."""
+    """Whether no main effect may be fully aliased with a two-factor interaction where the default table is regular."""
     seed: int = 1
-    """Of a design that is drawn."""
+    """Seed of a random design."""
 
     def given(self) -> tuple[str, ...]:
-        """Names of the options that differ from what is usual, but for the seed."""
+        """Names of the options that differ from their defaults, except the seed."""
         usual = DesignOptions()
         names = (one.name for one in fields(self) if one.name != "seed")
         return tuple(name for name in names if getattr(self, name) != getattr(usual, name))
@@ -66,9 +67,9 @@ class DesignOptions(Record):
 
 @dataclass(frozen=True)
 class Efficiency(Record):
-    """How well N runs tell the p terms of a model. d = det(X'X)^(1/p)/N, a = p/(N tr (X'X)^-1), g = p/(N times the
-    largest variance of the prediction), in percent of an orthogonal design; mean_variance of the prediction over the
-    region, in units of the variance of one run.
+    """How precisely N runs estimate the p terms of a model. d = det(X'X)^(1/p)/N, a = p/(N tr (X'X)^-1), g = p/(N times
+    the largest variance of the prediction), in percent of an orthogonal design; mean_variance: mean of the variance of
+    the prediction over the region, in units of the variance of one run.
     """
 
     d: float
@@ -79,59 +80,59 @@ class Efficiency(Record):
 
 @dataclass(frozen=True)
 class Points:
-    """The rows of a design, and what is to be said of it."""
+    """The rows of a design, and its description."""
 
     coded: FloatArray
     """Levels in coded units, shape (rows, factors): low is −1, high is +1."""
     unused: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
-    """Columns of its table that carry no factor, shape (rows, n): they serve as error. Empty: there are none."""
+    """Columns of its table without a factor, shape (rows, n), which estimate the error. Empty: there are none."""
     traits: tuple[str, ...] = ()
     generators: tuple[str, ...] = ()
-    """Of a fraction."""
+    """Generators of a fraction."""
     aliases: tuple[str, ...] = ()
-    """One line per column that is confused with others, factors by their letters."""
+    """One line per column that is aliased with others, with factors named by their letters."""
     notes: tuple[str, ...] = ()
-    """Sentences that a reader must know."""
+    """Remarks that the reader must know, as sentences."""
     block: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    """In which block each row is run, from 0, shape (rows,). Empty: there are no blocks."""
+    """Block of each row, counted from 0, shape (rows,). Empty: there are no blocks."""
     efficiency: Efficiency | None = None
-    """Of a design for a given model."""
+    """Efficiency of a design for a given model."""
     gained: tuple[str, ...] = ()
-    """Terms of that model that the finished runs alone could not tell from others."""
+    """Terms of that model that the finished runs alone could not estimate separately from others."""
 
 
 class Design(ABC):
     """A family of designs."""
 
     name: ClassVar[str]
-    """As it is written on the command line and in study files."""
+    """Name on the command line and in study files."""
     title: ClassVar[str]
-    """As a sentence writes it."""
+    """Name as written in a sentence."""
     doc: ClassVar[str]
-    """What it is for, in one line."""
+    """Purpose in one line."""
     options: ClassVar[tuple[str, ...]] = ()
-    """Fields of :class:`DesignOptions` that it takes."""
+    """Fields of :class:`DesignOptions` that it accepts."""
     mixture: ClassVar[bool] = False
-    """Whether its factors are the parts of a whole."""
+    """Whether its factors are the parts of a mixture."""
     main_effects_only: ClassVar[bool] = False
-    """Whether it is made for a model without interactions and squares."""
+    """Whether it is meant for a model without interactions and squares."""
 
     @abstractmethod
     def points(self, factors: int, options: DesignOptions) -> Points:
-        """The rows for a number of factors; raises StatisticsError where there are none for it."""
+        """Return the rows for a number of factors; raises StatisticsError if the family has none for it."""
 
 
 @dataclass(frozen=True)
 class ChosenDesign:
-    """A design of a stage with its options, as a study file names it."""
+    """The design of a stage with its options, as declared in a study file."""
 
     design: Design
     options: DesignOptions
 
-    # Asked for at every look at a study that runs, and a Latin hypercube is optimised for seconds.
+    # Cached: a running study needs the rows many times, and optimising a Latin hypercube takes seconds.
     @lru_cache(maxsize=64)  # noqa: B019 (a study file has three of them)
     def points(self, factors: int) -> Points:
-        """The rows for a number of factors, not to be changed; raises StatisticsError where there are none for it."""
+        """Return the rows for a number of factors, not to be modified; raises StatisticsError if there are none."""
         return self.design.points(factors, self.options)
 
 
@@ -142,5 +143,5 @@ def factor_letters(factors: int) -> tuple[str, ...]:
 
 
 def with_centre(levels: npt.NDArray[np.int64], centre: int | None) -> FloatArray:
-    """``levels``, shape (rows, columns), followed by as many runs in the middle as are asked for."""
+    """Return ``levels``, shape (rows, columns), followed by ``centre`` centre runs."""
     return np.vstack([levels, np.zeros((centre or 0, levels.shape[1]), dtype=np.int64)]).astype(np.float64)

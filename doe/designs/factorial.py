@@ -1,11 +1,12 @@
-"""Two-level factorial designs: all combinations of k factors, or a regular fraction of them by generators.
+"""Two-level factorial designs: all combinations of k factors, or a regular fraction of them given by generators.
 
 A generator "E=ABC" or "E=-ABC" sets the column of a factor to the (negative) product of others; factors are the letters
-of `factor_letters`. Every generator is a word that equals the identity (I = ABCE); the products of those words are the
-defining relation, its shortest word the resolution. Columns whose product is in the defining relation are one column:
-that is the alias structure. Of all fractions of one size, one of minimum aberration has the fewest words of length 3,
-of those the fewest of length 4, and so on. Source: Box and Hunter 1961, Technometrics 3:311; Fries and Hunter 1980,
-Technometrics 22:601; Montgomery 2017, Design and Analysis of Experiments, ch. 8.
+of `factor_letters`. Every generator gives a word that equals the identity (I = ABCE); these words and their products
+are the defining relation, and the length of its shortest word is the resolution. Columns whose product is in the
+defining relation are aliased: they are equal except for the sign. Of all fractions of one size, a minimum-aberration
+fraction has the fewest words of length 3, among those the fewest of length 4, and so on. Source: Box and Hunter 1961,
+Technometrics 3:311; Fries and Hunter 1980, Technometrics 22:601; Montgomery 2017, Design and Analysis of Experiments,
+ch. 8.
 """
 
 from __future__ import annotations
@@ -25,10 +26,10 @@ from doe.record import Record
 
 IntArray = npt.NDArray[np.int64]
 MOST_BASIC = 10
-"""Factors of a full factorial, 1024 runs."""
+"""Largest number of basic factors; a full factorial of them has 1024 runs."""
 ROMAN = ("", "I", "II", "III", "IV", "V", "VI", "VII", "VIII", "IX", "X", "XI")
 MOST_WORDS = 31
-"""Of a defining relation that is printed; the others are counted."""
+"""Words of a defining relation that are printed; of the others only the number is given."""
 GENERATOR = re.compile(r"^\s*([A-Z])\s*=\s*([+\-−]?)\s*([A-Z]+)\s*$")
 
 
@@ -52,7 +53,7 @@ class Word(Record):
 def factorial(factors: int, generators: Sequence[str] = ()) -> IntArray:
     """Return the 2^(factors - generators) design as levels -1, +1, shape (runs, factors), in standard order.
 
-    The factors that no generator sets are the basic ones; the first of them alternates fastest.
+    The factors that no generator sets are the basic factors; the first of them alternates fastest.
     Raises StatisticsError for generators that are not of the form "E=ABC", or more than 10 basic factors.
     """
     words = generator_words(factors, generators)
@@ -105,8 +106,8 @@ def defining_relation(words: Sequence[Word]) -> tuple[Word, ...]:
 def alias_chains(factors: int, words: Sequence[Word], order: int = 2) -> list[tuple[Word, ...]]:
     """Return the effects up to `order` factors in groups that share one column, each group's simplest effect first.
 
-    The sign of a word is that of its column relative to the first of its group. Effects that equal the mean stand in
-    the first group with an empty word, where there are any.
+    The sign of a word is that of its column relative to the first of its group. Effects aliased with the mean, if there
+    are any, form the first group, which begins with an empty word.
     """
     relation = defining_relation(words)
     effects = [Word(1, frozenset(c)) for size in range(1, order + 1) for c in combinations(range(factors), size)]
@@ -131,7 +132,7 @@ def word_lengths(words: Sequence[Word], factors: int) -> tuple[int, ...]:
 
 
 def standard_generators(factors: int, removed: int) -> tuple[str, ...]:
-    """Return generators of the fraction 2^(factors - removed) of minimum aberration.
+    """Return generators of the minimum-aberration fraction 2^(factors - removed).
 
     Raises StatisticsError for a fraction that is not in the list.
     """
@@ -164,8 +165,8 @@ STANDARD_FRACTIONS: dict[tuple[int, int], tuple[str, ...]] = {
     (8, 3): ("F=ABC", "G=ABD", "H=BCDE"),
     (8, 4): ("E=BCD", "F=ACD", "G=ABC", "H=ABD"),
 }
-"""(factors, generators) → generators: up to 8 factors of table 6.22 of Box, Hunter and Hunter 2005, Statistics for
-Experimenters; the others of ``FURTHER_FRACTIONS``."""
+"""(number of factors, number of generators) → generators: up to 8 factors from table 6.22 of Box, Hunter and Hunter
+2005, Statistics for Experimenters; the others from ``FURTHER_FRACTIONS``."""
 
 FURTHER_FRACTIONS = (
     (4, range(9, 16), "ABC ABD ACD BCD ABCD AB AC AD BC BD CD"),
@@ -181,8 +182,9 @@ FURTHER_FRACTIONS = (
 )
 """Basic factors, numbers of factors, and the right sides of the generators in turn, for 16, 32 and 64 runs.
 
-Generators as the library dexpy lists them (from Design-Expert). That none has less aberration (as in the catalogue of
-Chen, Sun and Wu 1993, Int. Stat. Rev. 61:131) was searched exhaustively: of 16 and 32 runs by the tests, of 64 once."""
+Generators as listed in the library dexpy (from Design-Expert). An exhaustive search found no fraction with less
+aberration (as in the catalogue of Chen, Sun and Wu 1993, Int. Stat. Rev. 61:131): the tests repeat it for 16 and 32
+runs; for 64 runs it was done once."""
 
 for _basic, _numbers, _right in FURTHER_FRACTIONS:
     for _factors in _numbers:
@@ -192,7 +194,9 @@ for _basic, _numbers, _right in FURTHER_FRACTIONS:
 
 @dataclass(frozen=True)
 class FactorialBlocks:
-    """A split into blocks: of every row, from 0; the generators as words; interactions of two that are lost."""
+    """A split into blocks: the block of every row, counted from 0; the block generators as words; the two-factor
+    interactions that are confounded with blocks.
+    """
 
     of_row: IntArray
     generators: tuple[str, ...]
@@ -200,7 +204,7 @@ class FactorialBlocks:
 
 
 def factor_columns(factors: int, generators: Sequence[str]) -> tuple[int, ...]:
-    """Return the columns of the factors as `doe.designs.blocks` counts them: bits of the basic factors."""
+    """Return the columns of the factors as `doe.designs.blocks` numbers them: one bit for each basic factor."""
     made = dict(generator_words(factors, generators))
     basic = [k for k in range(factors) if k not in made]
     bit = {factor: 1 << place for place, factor in enumerate(basic)}
@@ -208,9 +212,9 @@ def factor_columns(factors: int, generators: Sequence[str]) -> tuple[int, ...]:
 
 
 def factorial_blocks(factors: int, generators: Sequence[str], blocks: int, clear: int = 1) -> FactorialBlocks:
-    """Return the best split of `factorial(factors, generators)` into `blocks`, with effects of `clear` factors kept.
+    """Return the best split of `factorial(factors, generators)` into `blocks` blocks.
 
-    Raises StatisticsError where there is none.
+    Effects of up to `clear` factors are kept clear of the blocks. Raises StatisticsError if there is no such split.
     """
     columns = factor_columns(factors, generators)
     chosen = block_generators(columns, blocks, clear)
@@ -236,7 +240,7 @@ class Factorial(Design):
     options = ("runs", "centre", "generators", "fraction", "blocks")
 
     def points(self, factors: int, options: DesignOptions) -> Points:
-        """In standard order; centre runs only where they are asked for, with blocks as many in each."""
+        """Rows in standard order, then ``options.centre`` centre runs; with blocks, this number in each block."""
         asked = [name for name in ("generators", "fraction", "runs") if getattr(options, name)]
         if len(asked) > 1:
             raise StatisticsError(f"{asked[1]}: given together with {asked[0]}; allowed: one of the two")
@@ -261,7 +265,7 @@ class Factorial(Design):
 
 
 def _removed(factors: int, runs: int) -> int:
-    """P of the fraction of a size."""
+    """P of the fraction with this number of runs."""
     sizes = [2**factors] if factors <= MOST_BASIC else []
     if 2 <= factors - 1 <= MOST_BASIC:
         sizes.append(2 ** (factors - 1))
@@ -273,7 +277,7 @@ def _removed(factors: int, runs: int) -> int:
 
 
 def _resolution(factors: int, generators: Sequence[str]) -> tuple[str, ...]:
-    """A sentence: the shortest words of a fraction."""
+    """A sentence on a fraction: its resolution and the number of its shortest words."""
     if not generators:
         return ()
     lengths = word_lengths([word for _, word in generator_words(factors, generators)], factors)

@@ -1,9 +1,10 @@
-"""Mixture designs: the parts of a whole, which add up to it, so that no part can be changed alone.
+"""Mixture designs: the factors are parts that add up to a whole, so that no part can be changed alone.
 
-z_i = (x_i - low_i)/(total - sum of the lows) is what a part has of the room above all lows, 0 … 1 with the sum 1; with
-lows of zero it is the share. The simplex lattice {q, m} runs every blend of q parts in steps of 1/m; the simplex
-centroid every part alone, every two, every three, … in equal shares. Source: Scheffé 1958, J. Roy. Stat. Soc. B 20:344;
-Scheffé 1963, J. Roy. Stat. Soc. B 25:235; Cornell 2002, Experiments with Mixtures.
+z_i = (x_i - low_i)/(total - sum of the lows) is the share of a part in the amount above the lows (pseudocomponent),
+0 … 1 with the sum 1; with lows of zero it is the share in the whole. The simplex lattice {q, m} has every blend of q
+parts in steps of 1/m; the simplex centroid has every part alone and all blends of equal shares of two, three, … parts.
+Source: Scheffé 1958, J. Roy. Stat. Soc. B 20:344; Scheffé 1963, J. Roy. Stat. Soc. B 25:235; Cornell 2002, Experiments
+with Mixtures.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ class Mixture(Design):
     mixture = True
 
     def points(self, factors: int, options: DesignOptions) -> Points:
-        """Blends, then as many more of equal shares as are asked for; coded −1 is no part of the room, +1 all of it."""
+        """Blends, then ``options.centre`` blends of equal shares; −1 is none of the amount above the lows, +1 all."""
         if options.lattice is None:
             blends, trait = simplex_centroid(factors), "simplex centroid"
         else:

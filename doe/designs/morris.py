@@ -2,9 +2,9 @@
 
 A trajectory begins at a random point of a grid of 4 levels per factor and moves one factor after the other, in random
 order, by 2/3 of its range up or down: k + 1 runs give one elementary effect of each of k factors (Morris 1991,
-Technometrics 33:161, doi 10.1080/00401706.1991.10484804). Of many drawn trajectories those are kept that are furthest
-apart, chosen one by one (after Campolongo, Cariboni and Saltelli 2007, Environ. Model. Softw. 22:1509,
-doi 10.1016/j.envsoft.2006.10.004, who try all sets). `doe.analysis.elementary_effects` reads them.
+Technometrics 33:161, doi 10.1080/00401706.1991.10484804). Of many random trajectories, those furthest apart are
+kept, chosen one by one (after Campolongo, Cariboni and Saltelli 2007, Environ. Model. Softw. 22:1509,
+doi 10.1016/j.envsoft.2006.10.004, who compare all sets). `doe.analysis.elementary_effects` evaluates them.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from doe.errors import StatisticsError
 
 LEVELS = 4
 STEP = LEVELS / (LEVELS - 1)
-"""In coded units: 2/3 of the range, with which every level is reached from one side or the other."""
+"""In coded units: 2/3 of the range, so that from every level a step up or a step down leads to another level."""
 TRAJECTORIES = 10
 DRAWN = 20
-"""Times as many are drawn as are kept."""
+"""Number of random trajectories for each one that is kept."""
 
 
 def morris(factors: int, trajectories: int, seed: int) -> FloatArray:
@@ -36,7 +36,7 @@ def morris(factors: int, trajectories: int, seed: int) -> FloatArray:
     kept = [0]
     apart = np.zeros(len(drawn))
     while len(kept) < trajectories:
-        # Campolongo's distance of two trajectories: over all pairs of their points.
+        # Campolongo's distance between two trajectories is the sum over all pairs of their points.
         between = ((drawn[:, :, None] - drawn[kept[-1]][None, None]) ** 2).sum(axis=-1)
         apart += np.sqrt(between).sum(axis=(1, 2)) ** 2
         apart[kept] = -1.0
@@ -67,7 +67,7 @@ class Morris(Design):
     main_effects_only = True
 
     def points(self, factors: int, options: DesignOptions) -> Points:
-        """Ten trajectories by default; of a number of runs as many as it has room for, without a rest."""
+        """Ten trajectories by default; ``options.runs`` must be a whole number of trajectories, at least two."""
         runs = TRAJECTORIES * (factors + 1) if options.runs is None else options.runs
         trajectories, rest = divmod(runs, factors + 1)
         if rest or trajectories < 2:

@@ -1,16 +1,16 @@
-"""Optimal designs: the runs that tell the terms of a model best.
+"""Optimal designs: the runs that estimate the terms of a model most precisely.
 
-For any number of runs, in a region cut by constraints, with factors that are names, or beside runs that are made.
+They exist for any number of runs, with constraints on the region, with categorical factors, and beside finished runs.
 
-X is the model matrix of N runs, p its terms, f(x) a row of it. A D-optimal design has the largest det(X'X), so that the
-coefficients together are known best; an I-optimal one the least variance of the prediction, f'(X'X)^-1 f in units of
-sigma^2, in the mean over the region. Found by coordinate exchange from several drawn starts: every level of every run
-in turn is given the value with which the criterion is best, until nothing changes. It is the best that was found, not
-one that is proved. Source: Meyer and Nachtsheim 1995, Technometrics 37:60; Atkinson, Donev and Tobias 2007, Optimum
-Experimental Designs.
+X is the model matrix of N runs, p the number of its terms, f(x) a row of it. A D-optimal design has the largest
+det(X'X), so that the joint confidence region of the coefficients is smallest; an I-optimal one has the smallest
+variance of the prediction, f'(X'X)^-1 f in units of sigma^2, averaged over the region. Both are found by coordinate
+exchange from several random starts: each level of each run in turn is set to the value that is best for the criterion,
+until nothing changes. The result is the best design found, not a proven optimum. Source: Meyer and Nachtsheim 1995,
+Technometrics 37:60; Atkinson, Donev and Tobias 2007, Optimum Experimental Designs.
 
-A term is a product of functions of single factors: 1, x, x^2 of a number on -1 … +1; of a factor of c names 1 and c - 1
-contrasts, orthogonal over the names and with the mean square 1, for 2 names -1 and +1.
+A term is a product of functions of single factors: for a numeric factor 1, x, x^2 on -1 … +1; for a categorical factor
+of c names (its levels) 1 and c - 1 contrasts, orthogonal over the names and with mean square 1; for 2 names, -1 and +1.
 """
 
 from __future__ import annotations
@@ -31,26 +31,27 @@ from doe.errors import StatisticsError
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 SPARE_RUNS = 3
-"""More than terms, where no number is asked for."""
+"""Default number of runs in excess of the number of terms."""
 FEWEST_STARTS, MOST_STARTS = 6, 40
 LEVELS_TO_SET = 1500
-"""In all starts together, about: large designs are started less often."""
+"""Approximate number of levels in all starts together: large designs get fewer starts."""
 MOST_PASSES = 100
 GRID = {"linear": (-1.0, 1.0), "interactions": (-1.0, 1.0), "quadratic": (-1.0, -0.5, 0.0, 0.5, 1.0)}
-"""Model → levels that a number may take, beside where a constraint ends its range."""
+"""Model → levels that a numeric factor may take, besides the ends of its range under the constraints."""
 RIDGE = 1e-6
-"""Of N, added to X'X: while runs are too few it says in which direction another one tells most."""
+"""Times N, added to the diagonal of X'X: X'X is then invertible even while there are too few runs, and runs that add
+missing information are preferred."""
 REGION_POINTS = 4096
-"""Drawn in the cube, of which those within the constraints stand for the region."""
+"""Number of points drawn in the cube; those within the constraints represent the region."""
 MOST_CANDIDATES = 3000
 FEWEST_IN_REGION = 20
 SLACK = 1e-9
-"""Of a constraint, in coded units."""
+"""Tolerance of a constraint, in coded units."""
 
 
 @dataclass(frozen=True)
 class Region:
-    """What may be run: per factor its number of names (0: a number on -1 … +1), and rows (a, b) of a x <= b."""
+    """The allowed runs: number of names per factor (0: numeric, on -1 … +1), constraints a x <= b as rows (a, b)."""
 
     levels: tuple[int, ...]
     constraints: FloatArray
@@ -60,7 +61,7 @@ class Region:
         return np.asarray((points @ self.constraints[:, :-1].T <= self.constraints[:, -1] + SLACK).all(axis=1))
 
     def choices(self, point: FloatArray, factor: int, grid: Sequence[float]) -> FloatArray:
-        """The levels that one factor may take while the others stay: names, or grid and ends of what is allowed."""
+        """The levels that one factor may take with the others fixed: its names, or the grid and ends of its range."""
         if self.levels[factor]:
             return codes(self.levels[factor])
         low, high = -1.0, 1.0
@@ -72,8 +73,8 @@ class Region:
         return np.array([low, *inside, high]) if low < high else np.array([point[factor]])
 
     def candidates(self, grid: Sequence[float]) -> FloatArray:
-        """Points from which a search starts, shape (n, factors): every combination of low, middle, high and names, and
-        where the constraints end the range of a factor with the others there; the sample of a region that those miss.
+        """Points from which a search starts, shape (n, factors): combinations of low, middle, high and names, and at
+        each of them the ends of every constrained factor's range; if none of these is allowed, the sample.
         """
         corners = [one for one in grid if one in (-1.0, 0.0, 1.0)]
         levels = [codes(names) if names else np.array(corners) for names in self.levels]
@@ -94,7 +95,7 @@ class Region:
 
     @cached_property
     def sample(self) -> FloatArray:
-        """Points spread over the region, shape (n, factors); raises StatisticsError for a region without room."""
+        """Points spread over the region, shape (n, factors); raises StatisticsError if the region is too small."""
         drawn = 2 * qmc.Sobol(len(self.levels), rng=np.random.default_rng(0)).random(REGION_POINTS) - 1
         for factor, names in enumerate(self.levels):
             if names:
@@ -111,7 +112,7 @@ class Region:
 
 @dataclass(frozen=True)
 class Terms:
-    """Terms of a model: per term the number of the function of each factor, shape (p, factors), and its name."""
+    """Terms of a model: for each term the index of the function of each factor, shape (p, factors), and its name."""
 
     functions: IntArray
     names: tuple[str, ...]
@@ -125,19 +126,19 @@ class Terms:
         return columns
 
     def moments(self, region: Region) -> FloatArray:
-        """The mean of f f' over the region, shape (p, p): exact over the whole cube, of points within constraints."""
+        """The mean of f f' over the region, shape (p, p): exact for the cube, over the sample if constrained."""
         if len(region.constraints):
             rows = self.matrix(region.sample)
             return np.asarray(rows.T @ rows / len(rows))
         found = np.ones((len(self.names), len(self.names)))
         for factor, names in enumerate(self.levels):
-            # Of 1, x and x² on -1 … +1: 1/3 of x², 1/5 of x⁴. The functions of names are orthonormal.
+            # For 1, x and x² on -1 … +1: the mean of x² is 1/3, of x⁴ 1/5. The functions of names are orthonormal.
             mean = np.eye(names) if names else np.array([[1, 0, 1 / 3], [0, 1 / 3, 0], [1 / 3, 0, 1 / 5]])
             found *= mean[np.ix_(self.functions[:, factor], self.functions[:, factor])]
         return found
 
     def estimable(self, points: FloatArray) -> BoolArray:
-        """Whether the runs at points tell each term from all others, shape (p,)."""
+        """Whether the runs at points can estimate each term separately from all others, shape (p,)."""
         if not len(points):
             return np.zeros(len(self.names), dtype=np.bool_)
         _, singular, vectors = np.linalg.svd(self.matrix(points), full_matrices=True)
@@ -146,12 +147,12 @@ class Terms:
 
 
 def codes(names: int) -> FloatArray:
-    """Return the coded levels of a factor of so many names: -1 … +1 in equal steps."""
+    """Return the coded levels of a categorical factor with this number of names: -1 … +1 in equal steps."""
     return np.linspace(-1.0, 1.0, names)
 
 
 def model_terms(levels: Sequence[int], model: Model) -> Terms:
-    """Return the terms of a model; a factor of names has as many main effects as names but one, and no square."""
+    """Return the terms of a model; a categorical factor has one main effect fewer than names, and no square."""
     letters, k = factor_letters(len(levels)), len(levels)
     rows, names = [np.zeros(k, dtype=np.int64)], ["intercept"]
 
@@ -185,20 +186,20 @@ def model_terms(levels: Sequence[int], model: Model) -> Terms:
 def optimal_design(
     terms: Terms, region: Region, runs: int, grid: Sequence[float], kept: FloatArray, mean_variance: bool, seed: int
 ) -> FloatArray:
-    """Return `runs` points beside those that are kept, shape (runs, factors), of the best of several exchanges.
+    """Return `runs` points to be added to those kept, shape (runs, factors): the best result of several starts.
 
-    mean_variance: whether the mean variance of the prediction is least (I), or det(X'X) largest (D).
+    mean_variance: whether to minimise the mean variance of the prediction (I) or to maximise det(X'X) (D).
     """
     random = np.random.default_rng(seed)
     moments = terms.moments(region)
     fixed = terms.matrix(kept).T @ terms.matrix(kept) + RIDGE * (runs + len(kept)) * np.eye(len(terms.names))
     candidates = region.candidates(grid)
-    # Along an edge that is no axis a single level cannot move; a whole run can.
+    # On an edge that is parallel to no axis, no single level can change alone; a whole run can be replaced.
     others = candidates if len(region.constraints) else np.zeros((0, len(region.levels)))
     best: tuple[float, FloatArray] | None = None
     for start in range(_starts(runs, len(region.levels))):
         points = candidates[random.integers(len(candidates), size=runs)]
-        # Every other search for the best prediction begins where the coefficients are best.
+        # Every second I-optimal search starts from a D-optimal result.
         for criterion in (None, moments) if mean_variance and start % 2 else (moments if mean_variance else None,):
             _exchange(points, terms, region, grid, fixed, criterion, others)
         information = fixed + terms.matrix(points).T @ terms.matrix(points)
@@ -225,10 +226,10 @@ def _exchange(
     moments: FloatArray | None,
     candidates: FloatArray,
 ) -> None:
-    """Improve points in place, one level of one run at a time, or a whole run by one of the candidates.
+    """Improve points in place: change one level of one run at a time, or replace a whole run by a candidate.
 
-    With A the inverse of X'X without the run, a run with the row f multiplies det(X'X) by 1 + f'Af, and takes
-    f'A M A f/(1 + f'Af) from the mean variance (M: moments of the region).
+    With A the inverse of X'X without the run, adding a run with the row f multiplies det(X'X) by 1 + f'Af and reduces
+    the mean variance by f'A M A f/(1 + f'Af) (M: moments of the region).
     """
     rows, candidate_rows = terms.matrix(points), terms.matrix(candidates)
     for _ in range(MOST_PASSES):
@@ -256,9 +257,9 @@ def _exchange(
 
 
 def efficiency(terms: Terms, region: Region, points: FloatArray, grid: Sequence[float]) -> Efficiency:
-    """Return how well runs at points, shape (N, factors), tell a model.
+    """Return the efficiency of the runs at points, shape (N, factors), for a model.
 
-    The largest variance is climbed to from every run and a part of the region, one level at a time.
+    The largest variance is searched for from every run and some points of the region, by changing one level at a time.
     """
     rows = terms.matrix(points)
     n, p = rows.shape
@@ -287,14 +288,14 @@ def efficiency(terms: Terms, region: Region, points: FloatArray, grid: Sequence[
 
 
 class OptimalDesign(Design):
-    """Runs that tell a given model best."""
+    """Runs that estimate a given model most precisely."""
 
     title = "optimal"
     options = ("runs", "model", "constraints", "levels", "kept")
     mean_variance: ClassVar[bool]
 
     def points(self, factors: int, options: DesignOptions) -> Points:
-        """The runs that are kept, then the new ones: by default as many as there are terms, and three."""
+        """The kept runs, then the new ones; by default there are at least three more runs than terms in all."""
         levels = options.levels or (0,) * factors
         constraints = np.array(options.constraints, dtype=np.float64).reshape(-1, factors + 1)
         terms, region = model_terms(levels, options.model), Region(levels, constraints)
@@ -340,7 +341,7 @@ class OptimalDesign(Design):
 
 
 class DOptimal(OptimalDesign):
-    """The coefficients together are known best."""
+    """The largest det(X'X): the coefficients together are estimated most precisely."""
 
     name = "d-optimal"
     title = "D-optimal"
@@ -349,7 +350,7 @@ class DOptimal(OptimalDesign):
 
 
 class IOptimal(OptimalDesign):
-    """The prediction is known best in the mean."""
+    """The smallest mean variance of the prediction over the region."""
 
     name = "i-optimal"
     title = "I-optimal"

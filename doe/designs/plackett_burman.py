@@ -6,10 +6,10 @@ github.com/paulo-raca/plackett-burman print the same) and 40 (the 20-run table d
 every other and sums to zero, so N runs estimate N - 1 main effects independently of each other. Main effects are not
 free of two-factor interactions: see `interaction_aliases`.
 
-The printed tables of 8, 16 and 32 runs are regular fractions of a factorial, in which an interaction is a main effect
-wholly. There is no other table of 8 runs. Of 16 and 32 runs ``nonregular_table`` has one in which a main effect holds
-no interaction wholly, so that every three factors are seen in all combinations (projectivity 3: Box and Tyssedal 1996,
-Biometrika 83:950).
+The printed tables of 8, 16 and 32 runs are regular fractions of a factorial, in which main effects are fully aliased
+with two-factor interactions. There is no other table of 8 runs. For 16 and 32 runs ``nonregular_table`` gives one in
+which no main effect is fully aliased with a two-factor interaction, so that any three factors occur in all combinations
+(projectivity 3: Box and Tyssedal 1996, Biometrika 83:950).
 """
 
 from __future__ import annotations
@@ -53,13 +53,15 @@ SIZES = tuple(range(8, 49, 4))
 PALEY_32 = "+++-++-++++---+-+-+++----+--+--"
 """First row of the cyclic design of 32 runs: + at 0 and the squares modulo 31 (Paley 1933, J. Math. Phys. 12:311)."""
 TURNED_8 = (0, 1, 2, 4, 5, 6, 3)
-"""Columns of the table of 8 runs in an order in which none of its seven triples of columns with product ±1 is one."""
+"""Order of the columns of the table of 8 runs in which none of the seven triples of positions with the column product
+±1 keeps this product."""
 ORDER_16 = (11, 13, 10, 6, 9, 12, 8, 7, 5, 2, 3, 4, 1, 0, 14)
-"""Columns of the table of 16 runs: with up to 8 of the first, no two interactions of two are the same either."""
+"""Order of the columns of the nonregular table of 16 runs: with up to 8 factors, two-factor interactions are not
+fully aliased with each other either."""
 MOST_NONREGULAR = {16: 14, 32: 31}
-"""Runs → factors of a table without an interaction that is one main effect wholly."""
+"""Runs → largest number of factors without a main effect that is fully aliased with a two-factor interaction."""
 MOST_ALIASES = 12
-"""Interactions that are listed per factor; the others are counted."""
+"""Interactions listed per factor; of the others only the number is given."""
 
 
 def plackett_burman(runs: int) -> IntArray:
@@ -77,11 +79,12 @@ def plackett_burman(runs: int) -> IntArray:
 
 
 def nonregular_table(runs: int) -> IntArray:
-    """Return a table of 16 or 32 runs like `plackett_burman`'s that is no regular fraction.
+    """Return a table of 16 or 32 runs like `plackett_burman`'s that is not a regular fraction.
 
-    Of 16: columns (h, k) and (h, -k) with h and k those of two tables of 8 runs, and last the one that tells the halves
-    apart, (1, -1). This last one is each of seven interactions wholly, as one column at least is of every table of 16
-    runs that is made by doubling; the other 14 hold half of an interaction at most, the 31 of 32 runs a quarter.
+    With 16 runs: columns (h, k) and (h, -k) with h and k from two tables of 8 runs, and last the column that separates
+    the halves, (1, -1). The last column is fully aliased with seven two-factor interactions, as is at least one column
+    of every table of 16 runs made by doubling. Among the other 14 columns, alias coefficients are at most a half; among
+    the 31 of 32 runs, a quarter.
     Raises StatisticsError for other numbers of runs.
     """
     if runs == 32:
@@ -95,7 +98,7 @@ def nonregular_table(runs: int) -> IntArray:
 
 
 def tables(runs: int) -> tuple[IntArray, ...]:
-    """Return every table of a size; raises StatisticsError where there is none."""
+    """Return every table with this number of runs; raises StatisticsError if there is none."""
     return plackett_burman(runs), *([nonregular_table(runs)] if runs in MOST_NONREGULAR else [])
 
 
@@ -118,7 +121,7 @@ def fold_over(design: IntArray) -> IntArray:
 
 
 def interaction_aliases(design: IntArray) -> tuple[FloatArray, tuple[tuple[int, int], ...]]:
-    """Return how much of each two-factor interaction leaks into each main effect.
+    """Return the alias matrix: how much of each two-factor interaction biases each main effect.
 
     The alias matrix is A = X'Z/runs with Z the products of column pairs: the estimate of effect j has the
     expectation effect_j + sum over pairs of A[j, pair] x effect_pair. Returns A, shape (columns, pairs), and
@@ -129,7 +132,7 @@ def interaction_aliases(design: IntArray) -> tuple[FloatArray, tuple[tuple[int, 
 
 
 def interaction_overlap(design: IntArray) -> float:
-    """Return the largest |correlation| of two two-factor interactions, 0 … 1; 0 with fewer than three columns."""
+    """Return the largest |correlation| between two-factor interactions, 0 … 1; 0 with fewer than three columns."""
     if design.shape[1] < 3:
         return 0.0
     products, _ = _interactions(design)
@@ -140,7 +143,7 @@ def interaction_overlap(design: IntArray) -> float:
 def _interactions(design: IntArray) -> tuple[IntArray, tuple[tuple[int, int], ...]]:
     """Return the columns of all two-factor interactions, shape (runs, pairs), and the pairs of column indices."""
     pairs = tuple(combinations(range(design.shape[1]), 2))
-    one, other = np.array(pairs, dtype=np.int64).reshape(-1, 2).T  # of one column there are none
+    one, other = np.array(pairs, dtype=np.int64).reshape(-1, 2).T  # one column has no pairs
     return design[:, one] * design[:, other], pairs
 
 
@@ -155,9 +158,9 @@ def _cyclic(generator: IntArray) -> IntArray:
 
 
 def _doubled(design: IntArray) -> IntArray:
-    """Return the design of twice the runs, with one more column that tells the halves apart: [X X -1], [X -X +1].
+    """Return the design of twice the runs, with one more column that separates the halves: [X X -1], [X -X +1].
 
-    The rows are turned so that the one of all -1 stands last.
+    The second half comes first, so that the row of all -1 is the last.
     """
     apart = np.ones((design.shape[0], 1), dtype=np.int64)
     upper, lower = np.hstack([design, design, -apart]), np.hstack([design, -design, apart])
@@ -172,7 +175,7 @@ def _block_cyclic(generators: IntArray) -> IntArray:
 
 
 class PlackettBurman(Design):
-    """Two levels, as few runs as there are factors and one."""
+    """Two levels, with at least one run more than factors."""
 
     name = "plackett-burman"
     title = "Plackett–Burman"
@@ -181,7 +184,9 @@ class PlackettBurman(Design):
     main_effects_only = True
 
     def points(self, factors: int, options: DesignOptions) -> Points:
-        """The smallest table with a column for each factor, or that of ``runs`` rows; the mirror image after it."""
+        """The smallest table with a column for each factor, or that of ``options.runs`` rows; then its mirror image, if
+        folded; then centre runs.
+        """
         least = smallest_size(factors)
         if options.nonregular:
             least = next((size for size, most in MOST_NONREGULAR.items() if most >= factors), least)
@@ -205,7 +210,7 @@ class PlackettBurman(Design):
 
 
 def _confused(design: IntArray, size: int) -> tuple[str, ...]:
-    """A sentence where an interaction of two is one main effect wholly, and what would tell them apart."""
+    """If a two-factor interaction is fully aliased with a main effect, a sentence on what would separate them."""
     shares, _ = interaction_aliases(design)
     if np.abs(shares).max() < 1 - 1e-9:
         return ()
@@ -219,7 +224,7 @@ def _confused(design: IntArray, size: int) -> tuple[str, ...]:
 
 
 def alias_lines(design: IntArray) -> tuple[str, ...]:
-    """Return a line per factor, by its letter, into which interactions of two leak, the largest shares first."""
+    """Return a line for each factor that is aliased with two-factor interactions, by letters, largest shares first."""
     letters = factor_letters(design.shape[1])
     shares, pairs = interaction_aliases(design)
     lines = []
@@ -236,7 +241,7 @@ def alias_lines(design: IntArray) -> tuple[str, ...]:
 
 
 def _clear_of_interactions(design: IntArray) -> tuple[str, ...]:
-    """A sentence where main effects are clear of interactions of two, which are not clear of each other."""
+    """For clear main effects, a sentence on two-factor interactions that are aliased with each other, if any are."""
     shared = interaction_overlap(design)
     if shared < 1e-9:
         return ()
@@ -247,7 +252,7 @@ def _clear_of_interactions(design: IntArray) -> tuple[str, ...]:
 
 
 def _share(value: float) -> str:
-    """A leak as a fraction: these designs have them in thirds, fifths, sevenths."""
+    """An alias coefficient as a fraction: these designs have thirds, fifths and sevenths."""
     size = abs(float(value))
     if abs(size - 1) < 1e-9:
         return ""

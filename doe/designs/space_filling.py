@@ -1,7 +1,7 @@
-"""Designs that fill the cube: Latin hypercube and Sobol' sequence, for surrogate models and simulations.
+"""Space-filling designs: Latin hypercube and Sobol' sequence, for surrogate models and simulations.
 
 Source: McKay, Beckman and Conover 1979, Technometrics 21:239; Sobol' 1967, scrambled after Owen 1998 (both by
-scipy.stats.qmc). The hypercube is optimised against the centred discrepancy by random exchanges.
+scipy.stats.qmc). Random exchanges reduce the centred discrepancy of the hypercube.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ def latin_hypercube(factors: int, runs: int, seed: int) -> FloatArray:
 def sobol(factors: int, runs: int, seed: int) -> FloatArray:
     """Return the first `runs` points of a scrambled Sobol' sequence, coded, shape (runs, factors).
 
-    Only a power of two of them is balanced. Raises StatisticsError for fewer than one factor or two runs.
+    The points are balanced only if their number is a power of two. Raises StatisticsError for fewer than one factor or
+    two runs.
     """
     _require(factors, runs)
     power = int(np.ceil(np.log2(runs)))
@@ -50,7 +51,7 @@ class LatinHypercube(Design):
     options = ("runs",)
 
     def points(self, factors: int, options: DesignOptions) -> Points:
-        """10 per factor by default."""
+        """10 points per factor by default."""
         return Points(latin_hypercube(factors, options.runs or 10 * factors, options.seed))
 
 
@@ -63,6 +64,6 @@ class Sobol(Design):
     options = ("runs",)
 
     def points(self, factors: int, options: DesignOptions) -> Points:
-        """By default the power of two at or above 10 per factor."""
+        """By default, the smallest power of two that gives at least 10 points per factor."""
         usual = 2 ** int(np.ceil(np.log2(10 * factors)))
         return Points(sobol(factors, options.runs or usual, options.seed))

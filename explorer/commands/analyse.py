@@ -1,4 +1,4 @@
-"""``explorer analyse``: what the filled sheet of a designed experiment says."""
+"""``explorer analyse``: analyse the completed sheet of a designed experiment."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``explorer bench``: how fast the solver is, beside the engines that are installed."""
+"""``explorer bench``: time the solver and the other engines that are installed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from solver.benchmark import BenchmarkResult
 
 USUAL_DURATION = 4.0
-"""Of the pour [s]."""
+"""Simulated time of the case pour [s]."""
 
 
 def bench(
@@ -119,7 +119,7 @@ def bench(
 
 
 def _earlier(path: Path) -> dict[str, Any]:
-    """What an earlier run wrote; a :class:`CommandError` in one line where it is no such file."""
+    """Return what --json of an earlier run wrote; raises CommandError for any other file, or one without ratios."""
     import json
 
     from explorer.errors import CommandError

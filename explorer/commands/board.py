@@ -1,4 +1,4 @@
-"""``explorer board``: a study or a diagnosis on one page, finished or at work, without a pour."""
+"""``explorer board``: show a finished or running study or diagnosis on one page, without a pour."""
 
 from __future__ import annotations
 

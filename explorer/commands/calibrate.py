@@ -1,4 +1,4 @@
-"""`explorer calibrate`: the whole study in this process, with progress, into a folder."""
+"""``explorer calibrate``: run a whole study in this process, with progress, and write it to a folder."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def calibrate(
     if not headless:
         raise CommandError("calibrate: add --headless to run here, or start it from the panel of `explorer serve`")
     check_scheduler(scheduler, threads)
-    # Before any pour: a file that is no result, or cannot be written, is told at once.
+    # Before any pour, so that a baseline that is not a result, or a file that cannot be written, is reported at once.
     for option, path in (("--summary", summary), ("--junit", junit)):
         if path is not None:
             check_folder_of(path, option)

@@ -1,4 +1,4 @@
-"""``explorer design``: the runs of a designed experiment, as a sheet to fill in anywhere."""
+"""``explorer design``: write the runs of a designed experiment as a sheet to fill in."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Designs(Listing):
     heading = "Designs"
 
     def listed(self) -> Iterable[tuple[str, str]]:
-        """Each with its purpose."""
+        """Name and purpose of each design."""
         from doe.designs import DESIGNS
 
         return ((name, design.doc) for name, design in DESIGNS.items())

@@ -1,4 +1,4 @@
-"""``explorer diagnose``: which physical effect do measured data ask for that the declared model lacks?"""
+"""``explorer diagnose``: which physical effect in the measured data does the declared model lack?"""
 
 from __future__ import annotations
 

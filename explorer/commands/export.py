@@ -1,4 +1,4 @@
-"""``explorer export``: a pour or a material for another program."""
+"""``explorer export``: write a pour or a material for another program."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from explorer.commands.listing import Listing
 from explorer.commands.shared_options import RIG_MATERIAL, SCENE_HELP, SET
 
 SHORTEST, LONGEST = 0.1, 3600.0
-"""Simulated time of an exported pour [s]; that of one here is 0.1 … 60 s."""
+"""Range of the simulated time of an exported pour [s]; a pour made here is limited to 0.1 … 60 s."""
 
 
 class Programs(Listing):
@@ -20,7 +20,7 @@ class Programs(Listing):
     heading = "Programs"
 
     def listed(self) -> Iterable[tuple[str, str]]:
-        """With what each gets and takes."""
+        """Name of each program, with what it gets and the options that it accepts."""
         from explorer.export import EXPORTS
         from explorer.export.target import described
 

@@ -1,4 +1,4 @@
-"""``explorer lab``: a laboratory's readings become parameters, and its bench is repeated on the solver."""
+"""``explorer lab``: derive parameters from the readings of a bench test, and simulate the test."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Help of a command that takes the name of one of several things: they are listed below the options."""
+"""Help of a command whose argument names one of several things: they are listed below the options."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typer.core import TyperCommand
 
 
 class Listing(TyperCommand):
-    """A command with a list below its options; it is looked up when the help of this command is asked for."""
+    """A command with a list below its options; the list is made only when the help of this command is requested."""
 
     heading: str
 

@@ -110,7 +110,7 @@ def measure(
 
 
 def _refuse_twins(pictures: Sequence[Path]) -> None:
-    """Raise CommandError where a picture stands twice, under whatever name: a pile would be counted as two."""
+    """Raise CommandError if a picture is given twice, even under two names: its pile would be counted twice."""
     from explorer.errors import CommandError
 
     seen: dict[bytes, Path] = {}

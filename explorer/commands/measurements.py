@@ -1,4 +1,4 @@
-"""``explorer measurements``: what a measured data set holds, and what it can tell before anything is simulated."""
+"""``explorer measurements``: what a measured data set contains and can identify, before anything is simulated."""
 
 from __future__ import annotations
 

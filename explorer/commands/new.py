@@ -1,4 +1,4 @@
-"""``explorer new``: start a material, a study, a project or measured data of one's own."""
+"""``explorer new``: start a material, a study, a project or measured data of your own."""
 
 from __future__ import annotations
 
@@ -195,7 +195,7 @@ def measurement(
 
 
 def _tell(written: Sequence[Path], *command: str | Path) -> None:
-    """The files, and the command that uses them."""
+    """Print the files written, and a command that uses them."""
     import shlex
 
     for path in written:

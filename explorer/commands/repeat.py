@@ -1,4 +1,4 @@
-"""``explorer repeat``: more seeds of one scene, into the store."""
+"""``explorer repeat``: pour one scene with more seeds, and store the pours."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def repeat(
     with reporter_of("repeat", json) as reporter:
         found = pour_more(PoursOrder(scene, pours, out, store, threads, scheduler), reporter)
     rows = [
-        # One seed has a mean, and no standard deviation.
+        # A single seed has a mean but no standard deviation.
         [
             one.observable,
             f"{one.sample.mean:.4g}",

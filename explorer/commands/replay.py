@@ -1,4 +1,4 @@
-"""``explorer replay``: look at a recording again."""
+"""``explorer replay``: play a recording."""
 
 from __future__ import annotations
 

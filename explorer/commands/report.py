@@ -1,4 +1,4 @@
-"""``explorer report``: the report of finished folders, one or several joined."""
+"""``explorer report``: one report of one or several finished folders."""
 
 from __future__ import annotations
 

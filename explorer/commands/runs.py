@@ -1,4 +1,4 @@
-"""`explorer runs`: what the store holds."""
+"""``explorer runs``: list or export the stored runs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def runs(
     from explorer.terminal.text_table import text_table
 
     path = store or default_store()
-    # A store of another version of the physics has another name there.
+    # The default folder holds one store file for each version of the physics.
     others = sorted(set(path.parent.glob("*.sqlite")) - {path}) if store is None else []
     if not path.is_file():
         beside = f"; other stores there: {', '.join(other.name for other in others)}" if others else ""
@@ -32,7 +32,7 @@ def runs(
             f"--study {study}: no runs of this study in {path}; `explorer runs --store {path}` lists its studies"
         )
     if csv:
-        # All of them first: what is read anew is written back.
+        # List all runs before reading any: new readings are written back to the store.
         write_csv(
             [kept.read(run, observables_in_rig(run), observables_of) for run in list(kept.runs(study))], sys.stdout
         )

@@ -1,4 +1,4 @@
-"""``explorer schema``: what a file may hold, as JSON Schema for an editor; and an event of ``--json``, for CI."""
+"""``explorer schema``: JSON Schema of a file, for an editor, and of an event of ``--json``, for CI."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Files(Listing):
     heading = "Files"
 
     def listed(self) -> Iterable[tuple[str, str]]:
-        """Each with what it is."""
+        """Name and description of each kind of file."""
         return ((name, str(_table(name).__doc__).splitlines()[0]) for name in KINDS)
 
 

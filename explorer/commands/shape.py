@@ -1,4 +1,4 @@
-"""``explorer shape``: member spheres for a mesh."""
+"""``explorer shape``: fit member spheres to a mesh."""
 
 from __future__ import annotations
 

@@ -37,6 +37,6 @@ TOKEN = typer.Option(
 
 
 def report_option(result: str, *names: str) -> Any:
-    """The option for a new folder with a report and its data file ``result``; ``names``: of the option."""
+    """Return the option, with these ``names``, for a new folder with a report and its data file ``result``."""
     text = f"New folder for the report, its figures and data, and {result}."
     return typer.Option(None, *names, metavar="DIR", help=text)

@@ -1,4 +1,4 @@
-"""``explorer simulate``: pour a scene and print what came out."""
+"""``explorer simulate``: pour a scene and print the results."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Rigs(Listing):
     heading = "Rigs and bench tests"
 
     def listed(self) -> Iterable[tuple[str, str]]:
-        """Each with the first sentence of its module."""
+        """Name of each, with the first sentence of its module's docstring."""
         from solver.rigs import BENCH_RIGS, RIGS
 
         for name, kind in (*RIGS.items(), *BENCH_RIGS.items()):
@@ -93,7 +93,7 @@ def simulate(
     if large := large_pour_text(simulation.scene):
         typer.echo(large, err=True)
     table = None if json or events else RunTable(typer.echo)
-    # With --json a pour that goes well says nothing else.
+    # With --json, a pour without problems prints nothing but the result.
     people, every = partial(typer.echo, err=True), math.inf if json else EVERY
     with Reporter("simulate", people, sys.stdout if events else None, sys.stderr, every) as reporter:
         result = run_simulation(order, simulation, reporter, table, typer.echo)

@@ -1,4 +1,4 @@
-"""``explorer store``: look after the files that keep pours."""
+"""``explorer store``: maintain the files that store pours."""
 
 from __future__ import annotations
 

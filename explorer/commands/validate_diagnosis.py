@@ -1,4 +1,4 @@
-"""``explorer validate-diagnosis``: how often the diagnosis finds what made-up laboratories hide from it."""
+"""``explorer validate-diagnosis``: how often the diagnosis finds the known truth in data of made-up laboratories."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def validate_diagnosis(
     from explorer.terminal.validation import campaign_text
     from solver import check_scheduler
 
-    # Here --threads is for what stays on this machine: verdicts, and pours with an effect that the library lacks.
+    # Here --threads applies to the work on this machine: verdicts, and pours with an effect outside the library.
     check_scheduler(scheduler)
 
     number, _, of = shard.partition("/")
@@ -73,7 +73,7 @@ def validate_diagnosis(
         scheduler=scheduler,
         laboratory=laboratory or TREFOILS,
     )
-    # A wrong file is told before anything is made.
+    # A wrong file is reported before anything is written.
     read_laboratory(order.laboratory)
     end_as_by_ctrl_c()
     with reporter_of("validate-diagnosis", json) as reporter:

@@ -1,4 +1,4 @@
-"""``explorer verify``: the solver beside closed forms, conservation laws and a published benchmark."""
+"""``explorer verify``: compare the solver with closed-form solutions, conservation laws and a published benchmark."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from solver.verification import Row
 
 USUAL_POURS = 241
-"""So many of each kind make an equivalence test of margin 0.3 SD with a power of 0.9."""
+"""Pours of each kind that give an equivalence test with a margin of 0.3 SD a power of 0.9."""
 USUAL_LIMIT = 120.0
-"""Of a run of LIGGGHTS [s]."""
+"""Limit of the wall time of a run of LIGGGHTS [s]."""
 
 
 def verify(

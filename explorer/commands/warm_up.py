@@ -1,4 +1,4 @@
-"""``explorer warm-up``: compile the kernels that other commands need, before somebody waits for them."""
+"""``explorer warm-up``: compile in advance the kernels that other commands need."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from solver import Scene
 
 MANY_BODIES = 2000
-"""A measurement with more pours for hours, beside which a compilation of seconds is nothing."""
+"""Measurements with more bodies are left out: they pour for hours, so that seconds of compiling do not matter."""
 AN_EFFECT = {"effect.rolling_resistance.rolling_friction": 0.1}
-"""Which one does not matter: all are compiled in, or none."""
+"""Any effect would do: kernels are compiled with all effects or with none."""
 
 
 def warm_up(
@@ -42,7 +42,7 @@ def warm_up(
 
 
 def _rooms_of(sources: list[str]) -> dict[str, list[Scene]]:
-    """Name of a room → its scenes: every source without effects, with them, and with effects that come later."""
+    """Name of a room → its scenes: each source with effects off, with effects on, and with both in one worker pool."""
     from explorer.scene.file import load_scene
     from solver import with_values
     from solver.effects.columns import kernel_effects
