@@ -55,8 +55,8 @@ def central_composite_blocks(
     come first, the axial block is the last.
 
     centre: centre runs in each block; None: as many as bring alpha near that of rotatability. alpha: "inscribed" scales
-    the design to fit into the cube. Raises StatisticsError if the blocks cannot be orthogonal, or for face-centred
-    axial points.
+    the design to fit into the cube. Raises StatisticsError if the blocks cannot be orthogonal, for face-centred axial
+    points, without centre runs, or for numbers of factors other than 2 to 7.
     """
     if factors not in FACTORS:
         raise StatisticsError(f"factors = {factors}: central composite designs are made for 2 to 7 factors")
@@ -101,7 +101,7 @@ class CentralComposite(Design):
     options = ("centre", "alpha", "blocks")
 
     def points(self, factors: int, options: DesignOptions) -> Points:
-        """Corners, axial points, centre runs, with blocks as many in each."""
+        """Corners, axial points and centre runs; in blocks, their number in each or ``CENTRE_IN_BLOCKS``."""
         if options.blocks is not None:
             design, block = central_composite_blocks(factors, options.blocks, options.centre, options.alpha)
             furthest = np.abs(design[:, 0]).max() / np.abs(design[0, 0])

@@ -9,7 +9,7 @@ for λ → 0. The force ends at δ = λ^{2/3} δ_max. Without other damping, the
 
     e² = (1 − 5/2 λ + 3/2 λ^{5/3})/(1 − λ)
 
-at any speed (with forces linear in δ it would be 1 − λ): e = 0.82, 0.67, 0.42 for λ = 0.25, 0.5, 0.8.
+at any speed (with forces linear in δ it would be 1 − λ): e = 0.84, 0.67, 0.41 for λ = 0.25, 0.5, 0.8.
 Unloading is 1/(1 − λ) times as stiff, but needs no shorter time step: the force is continuous where the branches meet,
 and unloading takes fewer steps but also returns less energy. Impacts are as exact as without the effect
 (``tests/solver/effects``).

@@ -35,7 +35,7 @@ class PlateTilt(SetUpEffect):
         if angle == 0.0:
             return scene
         ux, uy = (math.radians(tilt) / angle for tilt in (self.tilt_x, self.tilt_y))
-        # Rodrigues about the horizontal axis (-uy, ux, 0), which takes -z towards (ux, uy).
+        # Rodrigues about the horizontal axis (uy, -ux, 0), which takes -z towards (ux, uy).
         gx, gy, gz = scene.gravity
         along = ux * gx + uy * gy
         level = along * math.cos(angle) - gz * math.sin(angle)

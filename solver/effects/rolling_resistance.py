@@ -5,7 +5,7 @@
     dashpot         −η_r 2 √(I k_r) ω_r while the spring is not at its cap, I = m* R*²       (0 by default)
 
 ω_r is the part of the relative angular velocity perpendicular to the normal. Vanishes for μ_r → 0. A sphere rests on a
-slope up to the angle tan⁻¹ μ_r; on a steeper slope α it rolls with an acceleration lowered by μ_r g cos α.
+slope up to the angle tan⁻¹ μ_r; on a steeper slope α it rolls with an acceleration lowered by 5/7 μ_r g cos α.
 Source: Ai, Chen, Rotter & Ooi 2011, Powder Technology 206:269; LIGGGHTS-PUBLIC `rolling_model_epsd2.h`. On member
 spheres of clumps it represents what their shape lacks: edges, and roughness finer than a sphere.
 

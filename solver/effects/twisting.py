@@ -3,8 +3,9 @@
     spring   T ← T − k_w (ω·n) dt,  k_w = ½ k_t a² = 4 G* a³,  capped at ⅔ a μ F_n          [N m]
     torque   T − ½ η_t a² (ω·n),  within the same cap        η_t: the tangential dashpot of the contact law [kg/s]
 
-For s = 1, the cap is the torque of Coulomb friction over a Hertzian contact area. The model has no free parameter, so
-its ``strength`` s scales stiffness, damping and cap together. Vanishes for s → 0.
+For s = 1, the cap is the torque of Coulomb friction for a uniform pressure over the contact area (3π/16 = 0.59 in place
+of ⅔ for a Hertzian one). The model has no free parameter, so its ``strength`` s scales stiffness, damping and cap
+together. Vanishes for s → 0.
 Source: Marshall 2009, Journal of Computational Physics 228:1541; LAMMPS `pair granular`, twisting "marshall".
 """
 

@@ -8,7 +8,7 @@ Notation as in ``hertz_mindlin.py``; V is ``contact.characteristic_velocity``.
                   F_t = T − γ v_t while sticking, T while slipping; capped at μ F_n as well
 
 k_n is the stiffness that stores ½ m* V² at the overlap that an elastic Hertzian impact at V makes, so an impact is as
-deep at V, deeper below, and lasts equally long at every speed: π √(m*/k_n) for e = 1. ζ(e) is the exact inverse for
+deep at V, shallower below, and lasts equally long at every speed: π √(m*/k_n) for e = 1. ζ(e) is the exact inverse for
 this contact (``restitution.py``: both laws are the same oscillator in other coordinates), whereas the usual
 γ = √(4 m* k_n/(1 + (π/ln e)²)) gives e only if the force may become tensile. The stiffness does not change during a
 contact, so ``contact.tangential_law`` makes no difference.

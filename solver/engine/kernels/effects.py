@@ -2,7 +2,7 @@
 
 Compiled in only for batches whose capacity has ``effects``; where an effect's first amplitude is zero, it is skipped.
 Parameters of a contact effect are in its columns of ``effect.row`` (by contact class), what a contact keeps is in its
-columns of ``effect.memory``.
+columns of ``memory.number``.
 """
 
 from solver.backend import ti
