@@ -8,9 +8,9 @@ Notation: grain i is pushed by j; normal n from j to i; overlap δ > 0 when touc
                   T ← T − k_t v_t dt, capped at μ F_n
                   F_t = T − c_t √(k_t m*) v_t while sticking, T while slipping; capped at μ F_n as well
 
-Two options of ``scenes/contact_model.py`` are conventions of other programs: ``mindlin`` scales T by a/a_prev on loading
-too, which keeps the displacement T/k_t (LIGGGHTS ``tangential history``), and ``uncapped`` exempts the dashpot from the
-limit μ F_n.
+Two options of ``scenes/contact_model.py`` are conventions of other programs: ``mindlin`` scales T by a/a_prev on
+loading too, which keeps the displacement T/k_t (LIGGGHTS ``tangential history``), and ``uncapped`` exempts the dashpot
+from the limit μ F_n.
 
 R* comes from the member spheres, m* from the bodies. c_n(e) is the exact inverse for this contact (`restitution.py`),
 so an impact reproduces the declared restitution; c_t = 2 √(5/6) |β|, β = ln e / √(ln² e + π²) (Tsuji 1992 as used in
