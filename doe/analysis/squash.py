@@ -27,6 +27,10 @@ class Squash:
         """``values``, (n, d), with their tails compressed."""
         return np.asarray(SQUASH * np.arcsinh((values - self.centre) / (SQUASH * self.deviation)), dtype=np.float64)
 
+    def undone(self, compressed: FloatArray) -> FloatArray:
+        """The values that ``compressed``, (n, d), stand for."""
+        return np.asarray(self.centre + SQUASH * self.deviation * np.sinh(compressed / SQUASH), dtype=np.float64)
+
     def slope(self, values: FloatArray) -> FloatArray:
         """Derivative of the compressed ``values``."""
         x = (values - self.centre) / (SQUASH * self.deviation)

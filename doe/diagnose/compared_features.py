@@ -263,10 +263,10 @@ def _loadings(
         stated = one.instrument[chosen] * slope
         for k in np.flatnonzero(stated > 0.0):
             found.append(stated[k] * np.eye(size)[places[k]])
-        place = c if one.axis is None else (one.axis, one.turned)
-        for of, change in zip("xy", instruments[c].axis if instruments else [], strict=False):
-            common.setdefault((of, place), np.zeros(size))[places] = change[chosen] * slope
         if instruments:
-            common.setdefault(("bias",), np.zeros(size))[places] = BIAS_ERROR * instruments[c].bias[chosen] * slope
+            axis = c if one.axis is None else (one.axis, one.turned)
+            (x, y), bias = instruments[c].axis, BIAS_ERROR * instruments[c].bias
+            for error, change in ((("x", axis), x), (("y", axis), y), (("bias",), bias)):
+                common.setdefault(error, np.zeros(size))[places] = change[chosen] * slope
     found += [moved for moved in common.values() if moved.any()]
     return np.asarray(emulator.whitening @ np.array(found).T, dtype=np.float64) if found else np.zeros((size, 0))

@@ -37,7 +37,7 @@ import numpy.typing as npt
 from scipy.linalg import block_diag
 
 from doe.analysis.covariance import pooled_slopes, residuals_within, shrunk_covariance
-from doe.analysis.squash import SQUASH, Squash, squash_of
+from doe.analysis.squash import Squash, squash_of
 from doe.errors import StatisticsError
 
 FloatArray = npt.NDArray[np.float64]
@@ -132,6 +132,11 @@ class Lessons:
         blocks = tuple(block[rows] for block in self.blocks)
         return Lessons(self.theta[rows], self.way[rows], self.amplitude[rows], self.own[rows], blocks)
 
+    @property
+    def near(self) -> npt.NDArray[np.bool_]:
+        """Whether a pour is of the base model with no parameter far off, (n,)."""
+        return np.asarray((self.way == -1) & (np.abs(self.theta) <= FAR).all(axis=1))
+
     def groups(self) -> npt.NDArray[np.int64]:
         """Index of each pour's group, (n,): pours of one way at one amplitude, with the same parameters far off."""
         keys = np.column_stack([self.way, self.amplitude, np.sign(self.theta) * (np.abs(self.theta) > FAR)])
@@ -191,10 +196,10 @@ class Emulator:
 
     def features(self, z: FloatArray) -> FloatArray:
         """Features (..., D) of all conditions, natural units, that correspond to ``z`` (..., D)."""
-        drawn_in = np.linalg.solve(self.whitening, np.atleast_2d(z).T).T
+        drawn_in = np.asarray(np.linalg.solve(self.whitening, np.atleast_2d(z).T).T, dtype=np.float64)
         centre = np.concatenate([squash.centre for squash in self.squashes])
         deviation = np.concatenate([squash.deviation for squash in self.squashes])
-        return np.asarray(centre + SQUASH * deviation * np.sinh(drawn_in / SQUASH)).reshape(z.shape)
+        return Squash(centre, deviation).undone(drawn_in).reshape(z.shape)
 
     @property
     def slopes(self) -> FloatArray:
@@ -293,8 +298,7 @@ def emulated(
             raise StatisticsError(f"{name}: {count} pours valid in every condition; allowed: at least 2")
     k, m = lessons.theta.shape[1], len(ways)
     base, own = lessons.way == -1, lessons.where(lessons.own)
-    still = (own.way == -1) & (np.abs(own.theta) <= FAR).all(axis=1)
-    squashes = tuple(squash_of(block, own.groups(), own.theta, still) for block in own.blocks)
+    squashes = tuple(squash_of(block, own.groups(), own.theta, own.near) for block in own.blocks)
     drawn_in = [squash(block) for squash, block in zip(squashes, lessons.blocks, strict=True)]
     whitening, freedom = _whitening([block[lessons.own] for block in drawn_in], own)
     # Only the mean over the pours of a condition gets unit covariance (over their mean number) by its weight.
@@ -302,14 +306,13 @@ def emulated(
     whitening = np.sqrt(unturned)[:, None] * whitening
     z = np.concatenate(drawn_in, axis=1) @ whitening.T
     slopes = pooled_slopes(z, lessons.groups(), lessons.theta)
-    near = base & (np.abs(lessons.theta) <= FAR).all(axis=1)
     shift = z - lessons.theta @ slopes
-    shift -= shift[near].mean(axis=0)
+    shift -= shift[lessons.near].mean(axis=0)
     # β_e by least squares through the origin, way by way, and the variance of its noise.
     square = np.array([(lessons.amplitude[lessons.way == w] ** 2).sum() for w in range(m)])
     told = [lessons.amplitude[lessons.way == w] @ shift[lessons.way == w] / square[w] for w in range(m)]
     signatures = np.stack(told or [0.0 * z[0]])
-    noise = 1.0 / square + 1.0 / near.sum() if m else np.ones(1)
+    noise = 1.0 / square + 1.0 / lessons.near.sum() if m else np.ones(1)
     variances, axes = signature_prior(signatures, noise, unturned)
     pour = unturned @ axes**2
     scales = signature_scales(signatures @ axes, noise[:, None] * pour, variances) if m else np.zeros(0)

@@ -442,9 +442,10 @@ class _Weigher:
     def fit(self, label: str, nodes: _Nodes, logs: FloatArray) -> Fit:
         """The model at its best node, with amplitudes and evidence from all nodes."""
         best = int(logs.argmax())
-        mean, noise = (one[0] for one in self.at(nodes.rows[best : best + 1]))
-        centre, prior = self.prior(label, replace(nodes, natural=nodes.natural[best : best + 1]))
-        theta, d, noise, z, slopes = (one[0] for one in self.bent(mean[None], noise[None], centre[:1], prior))
+        here = slice(best, best + 1)
+        mean, noise = self.at(nodes.rows[here])
+        centre, prior = self.prior(label, nodes)
+        theta, d, noise, z, slopes = (one[0] for one in self.bent(mean, noise, centre[here], prior))
         covariance = np.linalg.inv(np.linalg.inv(prior) + slopes.T @ (slopes / noise[:, None]))
         full = np.diag(noise) + slopes @ prior @ slopes.T + self._data.instrument @ self._data.instrument.T
         square, numbers = float(d @ np.linalg.solve(full, d)), len(d)
@@ -465,13 +466,13 @@ class _Weigher:
             tuple(amplitudes),
             theta,
             covariance,
-            centre[0],
+            centre[best],
             prior,
             slopes,
             z,
             noise,
-            mean,
-            self._emulator.at(nodes.rows[best : best + 1])[1][0],
+            mean[0],
+            self._emulator.at(nodes.rows[here])[1][0],
             float(logsumexp(weighed)),
             float(stats.f.sf(square / numbers, numbers, self._freedom)),
         )

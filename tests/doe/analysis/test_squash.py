@@ -13,6 +13,11 @@ def test_a_rare_large_count_is_drawn_in():
     assert large[0, 0] == pytest.approx(SQUASH * np.arcsinh(100.0 / SQUASH))
 
 
+def test_what_is_compressed_can_be_undone():
+    squash, values = Squash(np.array([1.0, -2.0]), np.array([0.5, 4.0])), np.array([[0.3, 9.0], [400.0, -2.0]])
+    assert squash.undone(squash(values)) == pytest.approx(values)
+
+
 def test_its_slope_is_its_derivative():
     squash = Squash(np.array([1.0, -2.0]), np.array([0.5, 4.0]))
     x, step = np.array([[0.3, 9.0], [40.0, -2.0]]), 1e-6
