@@ -112,18 +112,22 @@ class BodyEvidence:
             return np.zeros((*amplitudes.shape, len(self.rows)))
         return np.asarray(known(np.clip(amplitudes, known.x[0], known.x[-1])))
 
-    def predicted(self, model: ActingModel) -> tuple[FloatArray, FloatArray]:
-        """Mean (q,) and covariance (q, q) of the whitened numbers under ``model``."""
-        moved = [one for one in model.effects if self.moved_by(one[0])]
-        still = [self.shift(name, np.array(amplitude)) for name, amplitude, _ in moved]
+    def predicted(self, model: ActingModel) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Mean (q,), covariance of the noise (q, q) and loadings (q, k + p) of the whitened numbers under ``model``.
+
+        Loadings: shifts by one standard deviation of what piles depend on as well, the k parameters (by a Cholesky
+        factor of their covariance) and the amplitudes of the p effects, away from zero.
+        """
+        moved = [(p, one) for p, one in enumerate(model.effects) if self.moved_by(one[0])]
+        still = [self.shift(name, np.array(amplitude)) for _, (name, amplitude, _) in moved]
         mean = self._together(still, (len(self.rows),))
-        covariance = self._noise_of(still) + self.slopes @ model.unsure @ self.slopes.T
-        for k, (name, amplitude, deviation) in enumerate(moved):
-            beside = [*still[:k], self.shift(name, np.array(amplitude + deviation)), *still[k + 1 :]]
-            more = self._together(beside, mean.shape) - mean
-            covariance += np.outer(more, more)
-        mean = mean + self.slopes @ model.theta
-        return _white(self.factor, mean), _white(self.factor, _white(self.factor, covariance).T)
+        by_effects = np.zeros((len(self.rows), len(model.effects)))
+        for k, (p, (name, amplitude, deviation)) in enumerate(moved):
+            more = self.shift(name, np.array(amplitude + math.copysign(deviation, amplitude)))
+            by_effects[:, p] = self._together([*still[:k], more, *still[k + 1 :]], mean.shape) - mean
+        loadings = np.concatenate([self.slopes @ np.linalg.cholesky(model.unsure), by_effects], axis=1)
+        noise = _white(self.factor, _white(self.factor, self._noise_of(still)).T)
+        return _white(self.factor, mean + self.slopes @ model.theta), noise, _white(self.factor, loadings.T).T
 
     def told_apart(self, answers: Sequence[ActingModel]) -> npt.NDArray[np.bool_]:
         """Whether ``answers`` may differ by more than a standard deviation, parameters included, in each number (q,).

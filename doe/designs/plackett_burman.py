@@ -9,7 +9,8 @@ free of two-factor interactions: see `interaction_aliases`.
 The printed tables of 8, 16 and 32 runs are regular fractions of a factorial, in which main effects are fully aliased
 with two-factor interactions. There is no other table of 8 runs. For 16 and 32 runs ``nonregular_table`` gives one in
 which no main effect is fully aliased with a two-factor interaction, so that any three factors occur in all combinations
-(projectivity 3: Box and Tyssedal 1996, Biometrika 83:950).
+(projectivity 3: Box and Tyssedal 1996, Biometrika 83:950). The last column of 40 runs tells the halves apart: with 39
+factors it is fully aliased with 19 interactions, and every other main effect with one; with up to 38 factors none is.
 """
 
 from __future__ import annotations

@@ -93,10 +93,8 @@ def next_experiment(
     planned = run_now = 0
     # If single bodies tell all answers apart, no other set-up can do better.
     for some in (set_ups,) if bodies is None else (set_ups[:1], set_ups):
-        items, more = _items(training, found, weights, some, pours_in)
+        items, more = _items(training, found, weights, some, pours_in, bodies)
         run_now += more
-        if bodies is not None:
-            items = [_with_bodies(one, found, bodies) for one in items]
         if items:
             planned, ranked = fewest_pours(items, weights)
             if ranked[0].chance >= sum(weights.values()) - GIVEN_UP:
@@ -121,7 +119,8 @@ def checked_by_bodies(
     acts = {label: acting_in(found, label) for label in weights}
     if (bodies := wanted_bodies(measurement, declared, list(acts.values()))) is None:
         return ()
-    predictions = {label: Prediction(*bodies.predicted(acts[label])) for label in weights}
+    nothing = Prediction(np.zeros(0), np.zeros((0, 0)))
+    predictions = {label: with_bodies(nothing, np.zeros((0, 0)), acts[label], bodies) for label in weights}
     # Nothing is poured: all noise is in the predictions.
     (ranked,) = rank_experiments([CandidateExperiment(BODIES_ALONE, predictions)], weights, math.inf)
     return (Suggestion(ranked, {}, measurement.fit[0].name, tuple(weights), (), 0, bodies=bodies.asked),)
@@ -133,6 +132,7 @@ def _items(
     weights: Mapping[str, float],
     set_ups: Sequence[Condition],
     pours_in: PoursIn,
+    bodies: BodyEvidence | None,
 ) -> tuple[list[CandidateExperiment], int]:
     """Predictions of every answer in each of ``set_ups``, and how many pours had to be run for them."""
     model = pours_in(set_ups)
@@ -145,7 +145,7 @@ def _items(
     for c, set_up in enumerate(set_ups):
         lessons = training.told(probes, [[row[c]] for row in rows])
         with suppress(StatisticsError):  # a set-up that jams tells nothing
-            items.append(_item(training, found, weights, lessons, model, c, set_up))
+            items.append(_item(training, found, weights, lessons, model, c, set_up, bodies))
     return items, model.run_now
 
 
@@ -157,6 +157,7 @@ def _item(
     pours: ModelPours,
     c: int,
     set_up: Condition,
+    bodies: BodyEvidence | None,
 ) -> CandidateExperiment:
     """Predictions of every answer in a set-up, by a separate regression; StatisticsError if too few pours ended."""
     offered = feature_set(set_up).offered(offer_of(set_up))
@@ -173,8 +174,9 @@ def _item(
         axis = training.axis_in(pours, c, len(feature_set(set_up).scalars), axis_error)[:, columns]
         shared = emulator.whitening @ (axis * emulator.squashes[0].slope(emulator.squashes[0].centre)).T
     rows = [_rows(emulator, training, found, label) for label in weights]
-    best, theta = np.array([some[0] for some in rows]), np.array([found.fits[label].theta for label in weights])
-    _, loose, slopes = emulator.moved(theta)
+    best, fits = np.array([some[0] for some in rows]), [found.fits[label] for label in weights]
+    theta, spread = np.array([fit.theta for fit in fits]), np.array([np.diag(fit.theta_covariance) for fit in fits])
+    _, loose, slopes = emulator.moved(theta, theta**2 + spread)
     # The error of a regression on few pours is no property of an answer and does not last, so all answers get the same;
     # and differences between answers that its noise explains are removed, because they tell nothing apart.
     unsure = np.diag((emulator.at(best)[1] + loose).mean(axis=0)) * POURS / TAUGHT
@@ -182,9 +184,10 @@ def _item(
     means = shrunk_means(emulator.at(placed)[0], emulator.scatter(placed), np.array(list(weights.values())))
     predictions = {}
     for label, mean, some, slope in zip(weights, means, rows, slopes, strict=True):
-        beside = emulator.at(some[1:])[0] - emulator.at(some[:1])[0]
-        covariance = unsure + slope @ found.fits[label].theta_covariance @ slope.T + beside.T @ beside
-        predictions[label] = Prediction(mean, covariance + shared @ shared.T)
+        acts, beside = acting_in(found, label), emulator.at(some[1:])[0] - emulator.at(some[:1])[0]
+        loadings = np.concatenate([slope @ np.linalg.cholesky(acts.unsure), beside.T], axis=1)
+        of_pile = Prediction(mean, unsure + shared @ shared.T)
+        predictions[label] = with_bodies(of_pile, loadings, acts, bodies)
     return CandidateExperiment(set_up.name, predictions)
 
 
@@ -195,13 +198,17 @@ def acting_in(found: Posterior, label: str) -> ActingModel:
     return ActingModel(effects, fit.theta, fit.theta_covariance)
 
 
-def _with_bodies(item: CandidateExperiment, found: Posterior, bodies: BodyEvidence) -> CandidateExperiment:
-    """``item`` with predictions of the single-body numbers; adding a pour's noise to them is slightly too much."""
-    predictions = {}
-    for label, one in item.predictions.items():
-        mean, covariance = bodies.predicted(acting_in(found, label))
-        predictions[label] = Prediction(np.append(one.mean, mean), block_diag(one.covariance, covariance))
-    return replace(item, predictions=predictions)
+def with_bodies(one: Prediction, loadings: FloatArray, acts: ActingModel, bodies: BodyEvidence | None) -> Prediction:
+    """Prediction of a pile and of the numbers of single bodies, which depend on the same parameters and amplitudes.
+
+    ``loadings``: shifts of the pile by one standard deviation of each, (d, k + p), not contained in ``one``. Adding a
+    pour's noise to the numbers is slightly too much.
+    """
+    if bodies is not None:
+        mean, noise, more = bodies.predicted(acts)
+        one = Prediction(np.append(one.mean, mean), block_diag(one.covariance, noise))
+        loadings = np.concatenate([loadings.reshape(-1, more.shape[1]), more])
+    return Prediction(one.mean, one.covariance + loadings @ loadings.T)
 
 
 def _rows(emulator: Emulator, training: TrainingPours, found: Posterior, label: str) -> FloatArray:

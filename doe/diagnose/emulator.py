@@ -211,11 +211,14 @@ class Emulator:
         """Q, departure of the response to each parameter from linearity, (D, k)."""
         return self.mean[:, 1 + self.parameters + 2 * len(self.ways) :]
 
-    def moved(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Shift by parameters ``theta`` (n, k) and its variance, (n, D) each, and the slopes there, (n, D, k)."""
+    def moved(self, theta: FloatArray, square: FloatArray | float = 1.0) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Shift by parameters ``theta`` (n, k) and its variance, (n, D) each, and the slopes there, (n, D, k).
+
+        ``square``: expected θ² (n, k), which the variance of J is multiplied by, so that no model gains by a small θ.
+        """
         own, first = np.diagonal(self.covariance, axis1=1, axis2=2), 1 + self.parameters + 2 * len(self.ways)
-        # The variance of J is averaged over θ ~ N(0, I), so that no model gains by a small θ.
-        variance = own[:, 1 : 1 + self.parameters].sum(axis=1) + (theta**2 - 1.0) ** 2 @ own[:, first:].T
+        expected = np.broadcast_to(square, theta.shape)
+        variance = expected @ own[:, 1 : 1 + self.parameters].T + (theta**2 - 1.0) ** 2 @ own[:, first:].T
         slopes = self.slopes + 2.0 * theta[:, None, :] * self.bends
         return theta @ self.slopes.T + (theta**2 - 1.0) @ self.bends.T, variance, slopes
 

@@ -121,7 +121,7 @@ class Fit:
         Prediction at its best amplitude and parameters, (D,), and the variance of the data about it that is due to
         neither parameters nor instruments, (D,).
     still
-        Prediction at its best amplitude with the parameters at the means of their measurements, (D,).
+        Prediction at its best amplitude before the piles are seen, averaged over the parameters, (D,).
     unsure
         u, the part of ``variance`` that more pours of the model would remove, (D,).
     log_evidence
@@ -290,7 +290,7 @@ def gain_by_pours(one: Fit, other: Fit, emulator: Emulator, data: Data) -> float
     """
     slopes, root = emulator.slopes, np.linalg.cholesky(0.5 * (one.prior + other.prior))
     loadings = np.concatenate([slopes @ root, data.instrument], axis=1)
-    apart = one.still - other.still + slopes @ (one.centre - other.centre)
+    apart = one.still - other.still
     noise, unsure = 0.5 * (one.variance + other.variance), 0.5 * (one.unsure + other.unsure)
     now, then = (
         0.5 * float(apart @ np.linalg.solve(np.diag(left) + loadings @ loadings.T, apart))
@@ -404,10 +404,10 @@ class _Weigher:
         Returns θ (n, k); the data less the linearized prediction at ``centre`` (n or 1, k), its variance, and the
         prediction at the fit, (n, D) each; and the slopes there, (n, D, k).
         """
-        precision = np.linalg.inv(prior)
+        precision, square = np.linalg.inv(prior), centre**2 + np.diag(prior)
         theta = np.clip(np.broadcast_to(centre, (len(mean), len(prior))), -FARTHEST, FARTHEST)
         for _ in range(STEPS):
-            moved, unsure, slopes = self._emulator.moved(theta)
+            moved, unsure, slopes = self._emulator.moved(theta, square)
             left = self._data.z - mean - moved + (slopes @ (theta - centre)[:, :, None])[:, :, 0]
             weighted = (slopes / (variance + unsure)[:, :, None]).swapaxes(1, 2)
             best = np.linalg.solve(precision + weighted @ slopes, weighted @ left[:, :, None])
@@ -454,6 +454,8 @@ class _Weigher:
             numbers += len(self._data.bodies.off)
         weighed = logs + (nodes.share if len(nodes.share) else -math.log(len(logs)))
         weights = np.exp(weighed - logsumexp(weighed))
+        bent = centre[best] ** 2 + np.diag(prior) - 1.0
+        still = mean[0] + self._emulator.slopes @ centre[best] + self._emulator.bends @ bent
         sizes = {way.effect: len(way.unit) for way in self._emulator.ways}
         amplitudes: list[Amplitude] = []
         for effect in [] if label == "base" else label.split("+"):
@@ -471,7 +473,7 @@ class _Weigher:
             slopes,
             z,
             noise,
-            mean[0],
+            still,
             self._emulator.at(nodes.rows[here])[1][0],
             float(logsumexp(weighed)),
             float(stats.f.sf(square / numbers, numbers, self._freedom)),

@@ -174,7 +174,7 @@ def verdict_of(compared: Compared, declared: Declared, pours: Sequence[int], fol
     kind, names, statement = answer(found, followed_up)
     final = names[0] if names else "base"
     before, after = found.fits["base"], found.fits[final]
-    white = _Recalibrated(compared)
+    white = _recalibrated(compared)
     rows = sorted(found.effects, key=lambda one: -found.effects[one])
     likely = _likely_pairs(found)
     rows = [label for label in rows if "+" not in label or label in likely]
@@ -201,29 +201,22 @@ def taken_back(verdict: Verdict, why: str) -> Verdict:
     return replace(verdict, kind=UNEXPLAINED, names=(), statement=statement, taken_back=verdict.kind)
 
 
-class _Recalibrated:
-    """Shifts of z in standard errors of the data, less what recalibration can explain."""
-
-    def __init__(self, compared: Compared) -> None:
-        data, emulator = compared.data, compared.emulator
-        loadings = np.concatenate([emulator.slopes, data.instrument], axis=1)
-        noise = np.full(len(data.z), data.scatter / data.replicates)
-        self._factor = np.linalg.inv(np.linalg.cholesky(np.diag(noise) + loadings @ loadings.T))
-        self.base = emulator.at(emulator.row()[None])[0][0]
-        self.residual = self(data.z)
-
-    def __call__(self, z: FloatArray) -> FloatArray:
-        return np.asarray(self._factor @ (z - self.base), dtype=np.float64)
+def _recalibrated(compared: Compared) -> FloatArray:
+    """Map (D, D) from shifts of z to standard errors of the data, less what recalibration can explain."""
+    data, prior = compared.data, compared.posterior.fits["base"].prior
+    loadings = np.concatenate([compared.emulator.slopes @ np.linalg.cholesky(prior), data.instrument], axis=1)
+    noise = np.eye(len(data.z)) * data.scatter / data.replicates
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(noise + loadings @ loadings.T)), dtype=np.float64)
 
 
-def _effect_row(compared: Compared, white: _Recalibrated, label: str, pours: Sequence[int]) -> EffectRow:
+def _effect_row(compared: Compared, white: FloatArray, label: str, pours: Sequence[int]) -> EffectRow:
     found, emulator = compared.posterior, compared.emulator
-    fit = found.fits[label]
+    fit, base = found.fits[label], found.fits["base"]
     ways = [number for number, way in enumerate(emulator.ways) if way.effect == label]
-    shift = white(fit.still)
-    strength = 0.0
+    shift, strength = white @ (fit.still - base.still), 0.0
     if ways:
-        strength = float(np.linalg.norm(white(emulator.at(emulator.row({ways[0]: 1.0})[None])[0][0])))
+        nothing, reference = emulator.at(np.array([emulator.row(), emulator.row({ways[0]: 1.0})]))[0]
+        strength = float(np.linalg.norm(white @ (reference - nothing)))
     return EffectRow(
         name=label,
         probability=found.effects[label],
@@ -234,14 +227,14 @@ def _effect_row(compared: Compared, white: _Recalibrated, label: str, pours: Seq
         reference=emulator.ways[ways[0]].unit if ways else (),
         strength=strength,
         fitted_strength=float(np.linalg.norm(shift)),
-        cosine=_cosine(shift, white.residual),
+        cosine=_cosine(shift, white @ (compared.data.z - base.still)),
         pours=sum(pours[way] for way in ways),
     )
 
 
-def _similar(compared: Compared, white: _Recalibrated) -> tuple[tuple[str, str, float], ...]:
-    singles = {way.effect: compared.posterior.fits[way.effect] for way in compared.emulator.ways}
-    shifts = {name: white(fit.still) for name, fit in singles.items()}
+def _similar(compared: Compared, white: FloatArray) -> tuple[tuple[str, str, float], ...]:
+    fits = compared.posterior.fits
+    shifts = {way.effect: white @ (fits[way.effect].still - fits["base"].still) for way in compared.emulator.ways}
     names = list(shifts)
     pairs = [(a, b, _cosine(shifts[a], shifts[b])) for k, a in enumerate(names) for b in names[:k]]
     return tuple(sorted(pairs, key=lambda one: -abs(one[2])))

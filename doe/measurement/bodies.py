@@ -36,6 +36,8 @@ from solver import Body, ParameterError, Scene, actual, parse_quantity
 Array = npt.NDArray[np.float64]
 
 COLUMNS = ("body", "quantity", "unit", "mean", "standard_error")
+LEAST_ERROR = 1e-6
+"""Smallest standard error of a quantity on its scale: no balance is better, and smaller ones give singular evidence."""
 
 
 @dataclass(frozen=True)
@@ -206,8 +208,10 @@ def _row(cells: Sequence[str], scene: Scene) -> MeasuredBody:
         key: parse_quantity(f"{text}{suffix}", kind.unit, key)
         for key, text in (("mean", mean), ("standard_error", error))
     }
-    if numbers["standard_error"] <= 0.0:
-        raise MeasurementError(f"standard_error: {error}; allowed: more than 0")
     if numbers["mean"] < 0.0 or (kind.relative and numbers["mean"] == 0.0):
         raise MeasurementError(f"mean: {mean}; allowed: {'more than 0' if kind.relative else '0 or more'}")
-    return MeasuredBody(body, quantity, **numbers)
+    row = MeasuredBody(body, quantity, **numbers)
+    if row.deviation < LEAST_ERROR:
+        least = f"{LEAST_ERROR:g}{' of the mean' if kind.relative else ''}"
+        raise MeasurementError(f"standard_error: {error}; allowed: {least} or more")
+    return row

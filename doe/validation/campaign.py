@@ -282,7 +282,8 @@ class Answers:
             bodies = table_of_bodies(order.scene, asked.bodies, rng, order.drawn)
         with TemporaryDirectory() as folder:
             # The table of a changed condition has the format of the condition's own; only the set-up differs.
-            self.laboratory.hand_out(Path(folder), data, scanner, (ROOT, *truth.case.seed, 2), bodies)
+            own = scanner.of_turned_rig() if scanner is not None and asked.turned else scanner
+            self.laboratory.hand_out(Path(folder), data, own, (ROOT, *truth.case.seed, 2), bodies)
             measurement = load_measurement(Path(folder), follow_up=True)
         return replace(measurement, conditions=tuple(as_suggested(read, asked) for read in measurement.fit))
 

@@ -9,7 +9,7 @@ module shares no code with the reader of the file.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -68,6 +68,10 @@ class Scanner:
             elevation=float(rng.uniform(*ELEVATION)),
             azimuth=float(rng.uniform(0.0, 2.0 * math.pi)),
         )
+
+    def of_turned_rig(self) -> Scanner:
+        """The same scanner, which stays on the bench, in the frame of a rig that was turned by 180° under it."""
+        return replace(self, axis_x=-self.axis_x, axis_y=-self.axis_y, azimuth=self.azimuth + math.pi)
 
     def scan(self, centre: Array, radius: Array, rng: np.random.Generator) -> dict[str, Array]:
         """``height`` (n, n), ``x``, ``y`` (n,) [m] of spheres with centres (m, 3), radii (m,); NaN at unseen nodes."""

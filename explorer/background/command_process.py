@@ -137,8 +137,7 @@ class CommandProcess:
         """Let a paused command continue."""
         if self._status.state == "paused" and self._process is not None:
             os.killpg(self._process.pid, signal.SIGCONT)
-            if self._waker is not None:
-                self._waker.communicate()
+            self._dismiss_waker()
             self._status = replace(self._status, state="running")
 
     def close(self) -> None:
@@ -156,6 +155,7 @@ class CommandProcess:
         self._take_progress()
         if code is not None:
             self._process = None
+            self._dismiss_waker()
             self._status = replace(self._status, eta_s=None, **self._ending(code))
         elif self._cancelled_at is not None and time.monotonic() > self._cancelled_at + CANCEL_WAIT:
             os.killpg(self._process.pid, signal.SIGKILL)
@@ -169,8 +169,7 @@ class CommandProcess:
     def _launch(self, out: Path, arguments: Sequence[str]) -> None:
         # Workers of one of our own commands that has just ended may hold the lock a moment longer.
         patience = LOCK_WAIT if out == self.out else 0.0
-        self.out, self._command = out, arguments[0]
-        with self._log().open("ab") as log:
+        with _log_of(out).open("ab") as log:
             # The child inherits the lock with the open file and holds it until it ends, whatever happens to the page.
             if not _locked(log, patience):
                 raise BackgroundError(f"{out}: another page's command is running there; wait until it ends")
@@ -182,13 +181,15 @@ class CommandProcess:
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
             )
+        self.out, self._command = out, arguments[0]
         session_gives_way(self._process.pid, BACKGROUND)
         self._cancelled_at = None
         self._status = CommandStatus("running")
 
-    def _log(self) -> Path:
-        # Beside the output folder, which has to be empty for a new command.
-        return Path(f"{self.out}.log")
+    def _dismiss_waker(self) -> None:
+        if self._waker is not None:
+            self._waker.communicate()
+            self._waker = None
 
     def _ending(self, code: int) -> dict[str, Any]:
         if self._cancelled_at is not None and code != 0:
@@ -198,15 +199,7 @@ class CommandProcess:
         how = f"ended with exit code {code}"
         if code < 0:
             how = f"was ended from outside, or for want of memory (signal {-code}); its last line"
-        return {"state": "failed", "message": f"{self._command} {how}: {self._last_words()}"}
-
-    def _last_words(self) -> str:
-        log = self._log()
-        try:
-            lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
-        except OSError as error:  # removed, perhaps with its folder
-            return f"{log}: {error.strerror or error}"
-        return lines[-1][:300] if lines else f"no output; see {log}"
+        return {"state": "failed", "message": f"{self._command} {how}: {_last_words(self.out)}"}
 
     def _take_progress(self) -> None:
         if self.out is None or not (file := self.out / PROGRESS).is_file():
@@ -216,6 +209,20 @@ class CommandProcess:
             for line in _whole_lines(stream):
                 self._read += len(line)
                 self._status = advanced(self._status, line)
+
+
+def _log_of(out: Path | None) -> Path:
+    # Beside the output folder, which has to be empty for a new command.
+    return Path(f"{out}.log")
+
+
+def _last_words(out: Path | None) -> str:
+    log = _log_of(out)
+    try:
+        lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    except OSError as error:  # removed, perhaps with its folder
+        return f"{log}: {error.strerror or error}"
+    return lines[-1][:300] if lines else f"no output; see {log}"
 
 
 def _waker(group: int) -> subprocess.Popen[bytes]:

@@ -181,10 +181,10 @@ SUMMARY = {
     "potential": ti.f64,  # − m g·x [J]
     "speed": ti.f64,  # largest √(2 kinetic / mass) of the bodies outside the funnel that do not roll away [m/s]
     "funnel_speed": ti.f64,  # the same for the bodies in the funnel [m/s]
-    "discharged": ti.f64,  # mass below the outlet or taken out [kg]
-    "in_funnel": ti.f64,  # mass above the outlet [kg]
+    "discharged": ti.f64,  # mass of bodies that are not in the funnel, or were taken out [kg]
+    "in_funnel": ti.f64,  # mass above the outlet and within the inlet's radius [kg]
     "touching": ti.i32,  # touching contacts
-    "hanging": ti.i32,  # bodies above the outlet
+    "hanging": ti.i32,  # number of bodies in the funnel
     "asleep": ti.i32,  # sleeping bodies
     "finite": ti.i32,  # 0 once a number is not finite
 }

@@ -34,7 +34,7 @@ SMOOTH_ANGLE = math.radians(5.0)
 TRIANGLES_PER_CELL = 2.0
 """Triangles per cell that the surface crosses, about: the grid has √(triangles / this) cells along its longest axis."""
 MAX_CELLS = 64
-"""Largest number of grid cells along an axis."""
+"""Largest length of the grid [cells]; a point at its very end is in one cell more."""
 KEEP, LEAVE, SEE_GUARD = 0, 1, 2
 """Duties at an edge, as in ``state.TRIANGLE``."""
 PLANE, REVOLVED, PATCH = 0, 1, 2

@@ -124,7 +124,7 @@ class Trace:
     kinetic_energy: Array
     """Translation and rotation [J]."""
     contacts: Ints
-    """Number of touching pairs of member spheres or sphere and surface."""
+    """Number of pairs of member spheres, or sphere and surface, that touch or that a liquid bridge holds together."""
     max_overlap: Array
     """Largest overlap since the last sample, as a fraction of the member sphere's radius."""
     potential_energy: Array

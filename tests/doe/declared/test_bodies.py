@@ -117,9 +117,9 @@ def test_loads_of_two_adhesions_add_up_and_a_lower_friction_is_a_factor(data, se
     found = evidence_of(data, MeasuredBody("bead", row, wanted, 0.05 * wanted))
     width = math.hypot(0.05, TOGETHER)
     assert found.log_density(both, amplitudes, 1.0 + 1e-9) == pytest.approx([-math.log(width / 0.05)], abs=0.01)
-    mean, covariance = found.predicted(model(found.slopes.shape[1], *((name, at[name], 0.0) for name in names)))
+    mean, noise, _ = found.predicted(model(found.slopes.shape[1], *((name, at[name], 0.0) for name in names)))
     assert mean == pytest.approx(found.off, rel=0.01)
-    assert covariance == pytest.approx(np.array([[(width / 0.05) ** 2]]))
+    assert noise == pytest.approx(np.array([[(width / 0.05) ** 2]]))
 
 
 def model(k, *effects):
@@ -168,9 +168,13 @@ def test_what_is_measured_is_not_asked_for_again(data):
 def test_a_prediction_knows_how_well_its_amplitude_is_known(data):
     found = wanted_by(data, [("density_error", 0.1, 0.05)], [])
     acts = [("density_error", 0.1, 0.05), ("rolling_resistance", 0.1, 0.02)]
-    mean, covariance = found.predicted(model(found.slopes.shape[1], *acts))
+    k = found.slopes.shape[1]
+    mean, noise, loadings = found.predicted(model(k, *acts))
     assert mean == pytest.approx([math.log(1.1) / 0.01], rel=1e-3)
-    assert covariance == pytest.approx(np.array([[1.0 + (math.log(1.15 / 1.1) / 0.01) ** 2]]), rel=0.01)
+    assert noise == pytest.approx(np.eye(1))
+    assert loadings == pytest.approx(np.array([[0.0] * k + [math.log(1.15 / 1.1) / 0.01, 0.0]]), rel=0.01)
+    *_, lighter = found.predicted(model(k, ("density_error", -0.1, 0.05)))
+    assert lighter[0, -1] == pytest.approx(math.log(0.85 / 0.9) / 0.01, rel=0.01)
     assert found.predicted(model(found.slopes.shape[1]))[0] == pytest.approx([0.0])
 
 
@@ -207,11 +211,12 @@ def test_two_frictions_say_what_the_parameter_is_and_piles_what_a_third_will_be(
     explained, _ = found.parameters("adhesion_jkr", np.array([[work]]))
     assert abs(explained[0, 0]) < 0.05 * means[0, 0]
     other = wanted_by(data, acting("kinetic_friction"), [])
-    mean, spread = other.predicted(ActingModel([], np.array([1.5]), np.array([[0.04]])))
+    mean, noise, loadings = other.predicted(ActingModel([], np.array([1.5]), np.array([[0.04]])))
     q = [row.quantity for row in other.rows].index("apparent_kinetic_friction")
-    raw = (other.factor @ mean)[q], (other.factor @ spread @ other.factor.T)[q, q]
     own = other.slopes[q, 0]
-    assert raw == pytest.approx((1.5 * own, other.noise[q, q] + 0.04 * own**2))
+    assert (other.factor @ mean)[q] == pytest.approx(1.5 * own)
+    assert (other.factor @ noise @ other.factor.T)[q, q] == pytest.approx(other.noise[q, q])
+    assert (other.factor @ loadings)[q] == pytest.approx([0.2 * own])
 
 
 @pytest.mark.parametrize("off", [-1.39, 1.39])

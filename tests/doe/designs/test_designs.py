@@ -31,6 +31,12 @@ def test_plackett_burman_28_has_the_printed_rows():
         assert "".join("+" if level > 0 else "-" for level in design[row]) == signs
 
 
+def test_of_40_runs_only_the_last_column_aliases_fully():
+    for factors, fully in ((38, [0] * 38), (39, [1] * 38 + [19])):
+        aliases, _ = interaction_aliases(plackett_burman(40)[:, :factors])
+        assert (np.abs(aliases) > 0.999).sum(axis=1).tolist() == fully
+
+
 def test_plackett_burman_12_starts_with_its_generator():
     assert "".join("+" if level > 0 else "-" for level in plackett_burman(12)[0]) == "++-+++---+-"
 

@@ -7,12 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy import stats
+from scipy.linalg import block_diag
 
 from doe.declared.bodies import ActingModel, BodyEvidence, body_evidence, wanted_bodies
 from doe.declared.budget import Budget
 from doe.declared.model import declare
 from doe.diagnose import diagnosis
-from doe.diagnose.candidate_experiments import _with_bodies, checked_by_bodies
+from doe.diagnose.candidate_experiments import acting_in, checked_by_bodies, with_bodies
 from doe.diagnose.compared_features import MeasuredFeatures, weighed
 from doe.diagnose.emulator import Lessons, Way
 from doe.diagnose.next_experiment import DRAWS, CandidateExperiment, Prediction, chance_of_an_answer
@@ -117,15 +118,48 @@ def test_a_model_that_bodies_contradict_does_not_fit(data):
 def test_a_follow_up_that_asks_for_bodies_knows_what_they_will_tell(data):
     """Pours that say nothing, and a mass ten standard errors off by one answer: a balance nearly always finds it."""
     nothing = Prediction(np.zeros(1), np.zeros((1, 1)))
-    item = CandidateExperiment("as it is", dict.fromkeys(ALIKE, nothing))
     declared = declare(data, tuple(EFFECTS))
     k = len(declared.parameters)
     answers = [ActingModel([(name, 0.1, 1e-6)], np.zeros(k), np.eye(k)) for name in ALIKE]
     bodies = wanted_bodies(data, declared, answers)
     found = known(compared(None).posterior)
-    weights = dict.fromkeys(ALIKE, 0.5)
-    assert chance_of_an_answer(item, weights, 6) == 0.0
-    assert chance_of_an_answer(_with_bodies(item, found, bodies), weights, 6) > 0.99
+    weights, by_pile = dict.fromkeys(ALIKE, 0.5), np.zeros((1, k + 1))
+    for some, low, high in ((None, 0.0, 0.0), (bodies, 0.99, 1.0)):
+        predictions = {name: with_bodies(nothing, by_pile, acting_in(found, name), some) for name in ALIKE}
+        assert low <= chance_of_an_answer(CandidateExperiment("as it is", predictions), weights, 6) <= high
+
+
+def test_a_pile_and_bodies_are_predicted_together(data):
+    """One parameter, with slopes J and K, moves both: Cov = diag(V, N) + (J, K)ᵀ C (J, K)."""
+    slopes, noise, unsure = np.array([[3.0], [-1.0]]), np.diag([1.0, 2.0]), np.array([[0.3]])
+    factor = np.linalg.cholesky(noise + slopes @ slopes.T)
+    bodies = BodyEvidence(None, (None, None), np.zeros(2), slopes, noise, factor, ())
+    pile, of_pile = np.array([[2.0], [0.5], [0.0]]), 0.1 * np.eye(3)
+    acts = ActingModel([], np.array([1.2]), unsure)
+    found = with_bodies(Prediction(np.zeros(3), of_pile), pile @ np.sqrt(unsure), acts, bodies)
+    both = np.concatenate([pile, np.linalg.solve(factor, slopes)])
+    white = np.linalg.solve(factor, np.linalg.solve(factor, noise).T)
+    assert found.mean == pytest.approx(np.append(np.zeros(3), np.linalg.solve(factor, 1.2 * slopes[:, 0])))
+    assert found.covariance == pytest.approx(block_diag(of_pile, white) + both @ unsure @ both.T)
+    alone = with_bodies(Prediction(np.zeros(3), of_pile), pile @ np.sqrt(unsure), acts, None)
+    assert alone.covariance == pytest.approx(found.covariance[:3, :3])
+
+
+def test_an_unsure_slope_counts_as_far_as_a_parameter_may_be_off():
+    """Var J Σ E θ²: bodies that leave θ ~ N(c, C) make it c² + C of what N(0, 1) makes it."""
+    taught = emulator({}, sensitivity=np.ones(SIZE), moved=1.0)
+    bare = posterior(taught, Data(np.zeros(SIZE), 6), pairs=False).fits["base"]
+    loose = taught.covariance[:, 1, 1]
+    for off, slope in ((0.0, 3.0), (6.0, 3.0), (0.0, 0.0)):
+        slopes = np.array([[slope]])
+        factor = np.linalg.cholesky(np.eye(1) + slopes @ slopes.T)
+        bodies = BodyEvidence(None, (None,), np.array([off]) / factor[0], slopes, np.eye(1), factor, ())
+        fit = posterior(taught, Data(np.zeros(SIZE), 6, bodies=bodies), pairs=False).fits["base"]
+        left = 1.0 / (1.0 + slope**2)
+        square = (slope * off * left) ** 2 + left
+        assert fit.variance - bare.variance == pytest.approx(loose * (square - 1.0), rel=1e-6)
+        # Before the piles are seen the model predicts what bodies say of the parameter.
+        assert fit.still - bare.still == pytest.approx(taught.slopes[:, 0] * slope * off * left)
 
 
 def known(found):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from doe.declared.bodies import BodyEvidence
 from doe.declared.model import CalibratedParameter, Declared, DeclaredCondition
 from doe.diagnose.compared_features import MeasuredFeatures, weighed
 from doe.diagnose.emulator import Lessons, Way
@@ -178,3 +179,27 @@ def test_the_tables_of_a_verdict_by_closed_form():
     # A shift by one deviation; the means of 200 pours leave 0.1 of it.
     assert effect.strength == pytest.approx(1.0 / np.sqrt(noise), rel=0.25)
     assert effect.pours == 200
+
+
+def test_strengths_know_what_bodies_say_of_the_parameters():
+    """An effect that shifts what a parameter shifts: recalibration absorbs all but 1/√(noise + Θ) of it."""
+    rng = np.random.default_rng(2)
+    way = np.repeat([-1, 0], 200)
+    theta = np.where(np.arange(400) % 2, 1.0, -1.0)[:, None]
+    block = rng.standard_normal((400, 4)) + (theta + (way == 0)[:, None]) * np.eye(4)[1]
+    taught = Lessons(theta, way, (way == 0).astype(float), np.ones(400, bool), (block,))
+    values = rng.standard_normal((6, 4))
+    values += np.eye(4)[1] - values.mean(axis=0)
+    data = MeasuredFeatures("low", "scan", ("height", "width", "area", "lean"), values, np.zeros(4), scalars=1)
+    parameter = CalibratedParameter("friction", 0.0, 1.0, 0.3, 0.05)
+    declared = Declared((parameter,), (), (DeclaredCondition("low", data.names),))
+    for slope in (None, 1.0, 100.0):
+        bodies, left = None, 1.0
+        if slope is not None:
+            slopes, left = np.array([[slope]]), 1.0 / (1.0 + slope**2)
+            factor = np.linalg.cholesky(np.eye(1) + slopes @ slopes.T)
+            bodies = BodyEvidence(None, (None,), np.zeros(1), slopes, np.eye(1), factor, (), {"twisting": None})
+        compared = weighed(taught, (Way("twisting", "twisting"),), [data], (), bodies)
+        (effect,) = verdict_of(compared, declared, (200,), followed_up=False).effects
+        noise = compared.data.scatter / 6.0
+        assert effect.strength == pytest.approx(1.0 / np.sqrt(noise + left), rel=0.15), slope

@@ -18,7 +18,7 @@ from doe.measurement.condition_table import in_rig
 from doe.measurement.features import SCALARS, SCAN, features_of_data, offer_of
 from doe.store import Store
 from doe.validation.campaign import OFFERS, SETS, Answers, CampaignOrder, run_campaign
-from doe.validation.laboratory import TREFOILS, read_laboratory, table_of_bodies
+from doe.validation.laboratory import TREFOILS, Laboratory, LaboratoryPour, read_laboratory, table_of_bodies
 from doe.validation.outside import OUTSIDE_EFFECTS, possible_outside
 from doe.validation.scanner import Scanner
 from doe.validation.sets import SetRow, append_rows
@@ -222,3 +222,23 @@ def test_bodies_are_measured_without_a_pour_where_they_alone_are_asked_for():
     assert found.conditions == ()
     (row,) = found.bodies
     assert row.mean == pytest.approx(1.2 * declared.scene.bodies[0].mass, rel=0.02)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_turned_rig_is_scanned_by_a_scanner_that_was_not_turned(monkeypatch, turned):
+    laboratory, used = read_laboratory(TREFOILS), []
+    pour = LaboratoryPour(dict.fromkeys(laboratory.readings, 1.0), np.array([[0.0, 0.0, 0.01]]), np.array([0.01]))
+    monkeypatch.setattr(Answers, "measured", lambda self, truth, conditions, *_: {conditions[0].name: [pour] * 6})
+    handed_out = Laboratory.hand_out
+
+    def hand_out(self, folder, data, scanner, *others):
+        used.append(scanner)
+        handed_out(self, folder, data, scanner, *others)
+
+    monkeypatch.setattr(Laboratory, "hand_out", hand_out)
+    asked = Suggestion(RankedExperiment("turned", 0.9, 3.0), {}, laboratory.declared.fit[0].name, (), (), 6, turned)
+    scanner = Scanner.drawn(np.random.default_rng(1))
+    answers = Answers(laboratory, None, SimpleNamespace(store=None, pours=None), Budget())
+    (found,) = answers.followed_up(Truth(Case(9, 0, "null"), ()), asked, scanner).fit
+    assert found.turned == turned
+    assert used == [scanner.of_turned_rig() if turned else scanner]

@@ -51,6 +51,24 @@ def test_a_camera_aslant_leaves_a_shadow_behind_the_pile():
     assert missing[before].mean() < 0.3
 
 
+def test_a_scanner_stays_on_the_bench_under_which_a_rig_is_turned():
+    """In the turned rig's frame the pile is turned, and so are the error of the axis and the shadow."""
+    one = scanner(axis_x=0.002, axis_y=-0.001, elevation=np.radians(45.0), azimuth=0.5)
+    sign = np.array([-1.0, -1.0, 1.0])
+    places = []
+    for own, centre in ((one, BALL[0]), (one.of_turned_rig(), BALL[0] * sign)):
+        scan = own.scan(centre, BALL[1], np.random.default_rng(3))
+        x, y = np.meshgrid(scan["x"], scan["y"], indexing="ij")
+        high = np.nan_to_num(scan["height"])
+        top = np.array([(one * high).sum() / high.sum() for one in (x, y)])
+        near = np.isnan(scan["height"]) & (np.hypot(x - top[0], y - top[1]) < 0.018)
+        places.append((top, np.array([x[near].mean(), y[near].mean()])))
+    for as_it_is, turned in zip(*places, strict=True):
+        # Half a node.
+        assert turned == pytest.approx(-as_it_is, abs=0.5e-3)
+    assert np.hypot(*(places[0][0] - [0.006, -0.003])) < 1.5e-3
+
+
 def test_scanners_differ_within_what_may_be_bought():
     drawn = [Scanner.drawn(np.random.default_rng(k)) for k in range(40)]
     ranges = ScannerRanges()

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from explorer.background.command_process import CommandProcess
 from tests.explorer.background.waiting import wait_for
 
 TICKING = """
@@ -55,3 +56,16 @@ def test_a_paused_command_goes_on_when_its_page_is_killed(tmp_path, wish):
         page.kill()
         page.wait()
         os.killpg(int((tmp_path / "child").read_text()), signal.SIGKILL)
+
+
+def test_a_paused_command_that_is_killed_leaves_no_process_to_wake_it(tmp_path):
+    (tmp_path / "ticking.py").write_text(TICKING)
+    process = CommandProcess("study", {}, (sys.executable, str(tmp_path / "ticking.py")))
+    process.start(tmp_path / "out", ("tick", str(tmp_path / "ticks")))
+    wait_for(lambda: (tmp_path / "ticks").exists())
+    process.pause()
+    waker = process._waker
+    os.killpg(process._process.pid, signal.SIGKILL)
+    wait_for(lambda: process.status().state == "failed")
+    assert waker.returncode is not None
+    assert process._waker is None

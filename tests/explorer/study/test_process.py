@@ -188,6 +188,8 @@ def test_a_study_that_another_page_runs_is_not_resumed(tmp_path):
     wait_for(lambda: first.status().done == 3)
     with pytest.raises(BackgroundError, match="another page's command is running"):
         second.resume()
+    # The folder of the other page's study is not taken for its own.
+    assert second.out is None
     first.close()
 
 
