@@ -77,7 +77,7 @@ class Reporter:
         self._started, self._said = clock(), 0.0
         self._out: Path | None = None
         self._last = ProgressEvent(stage="", done=0, planned=0)
-        self._diverged = 0
+        self._diverged: list[int] = []  # seeds, in the order in which they were reported
         self._scenes: dict[int, Path] = {}
         self._place_of_bar, self._every = bar or sys.stdout, every
         self._bar: Bar | None = None
@@ -154,14 +154,16 @@ class Reporter:
         self._leave(scene, seed, what, folder, appears_as)
 
     def _leave(self, scene: Scene, seed: int, what: str, folder: Path | None, appears_as: Path | None = None) -> None:
-        if self._diverged >= MOST_SCENES:
+        if len(self._diverged) >= MOST_SCENES:
             return
-        self._diverged += 1
-        last = "; further ones are not reported" if self._diverged == MOST_SCENES else ""
+        # Two scenes may diverge with one seed.
+        before = self._diverged.count(seed)
+        self._diverged.append(seed)
+        last = "; further ones are not reported" if len(self._diverged) == MOST_SCENES else ""
         if folder is None:
             self.say(f"{what}; to reproduce it, run `explorer simulate` with this scene and --seed {seed}{last}")
             return
-        name = f"diverged_{seed}.toml"
+        name = f"diverged_{seed}{f'_{before + 1}' if before else ''}.toml"
         path = (appears_as or folder) / name
         again = f"explorer simulate {shlex.quote(str(path))} --seed {seed}"
         heading = f"{what[0].upper()}{what[1:]}. To reproduce it:\n{again}"

@@ -15,7 +15,7 @@ from explorer.background.progress import PourProgress, SetProgress
 from explorer.background.reporter import LOG, MOST_SCENES, Reporter, reporter_of
 from explorer.errors import CommandError
 from explorer.scene.file import load_scene
-from solver import Job, Outcome, PourBrokeOff, pour_key
+from solver import Job, Outcome, PourBrokeOff, pour_key, with_values
 from tests.doe.test_pour_runner import made_up
 from tests.explorer.beads import bead_scene
 from tests.explorer.command_line import explorer, refused
@@ -108,6 +108,16 @@ def test_the_scene_of_a_pour_that_diverged_is_written_and_named_a_few_times(tmp_
     assert f"explorer simulate {file} --seed 1" in said[0]
     assert "overlap of 0.2 radii" in said[0]
     assert pour_key(load_scene(str(file)), 1) == pour_key(scene, 1)
+
+
+def test_two_scenes_that_diverge_with_one_seed_are_both_written(tmp_path):
+    said, scenes = [], [bead_scene(), with_values(bead_scene(), {"pair.bead.bead.static_friction": 0.7})]
+    with Reporter("repeat", said.append) as reporter:
+        reporter.begin(tmp_path)
+        list(reporter.watched(diverged_pours)(deque(Job(one, 4) for one in scenes), scenes))
+    for name, scene, line in zip(("diverged_4.toml", "diverged_4_2.toml"), scenes, said, strict=True):
+        assert f"explorer simulate {tmp_path / name} --seed 4" in line
+        assert pour_key(load_scene(str(tmp_path / name)), 4) == pour_key(scene, 4)
 
 
 def test_so_is_that_of_one_that_broke_off(tmp_path):
