@@ -123,8 +123,11 @@ class BodyEvidence:
         mean = self._together(still, (len(self.rows),))
         by_effects = np.zeros((len(self.rows), len(model.effects)))
         for k, (p, (name, amplitude, deviation)) in enumerate(moved):
-            more = self.shift(name, np.array(amplitude + math.copysign(deviation, amplitude)))
-            by_effects[:, p] = self._together([*still[:k], more, *still[k + 1 :]], mean.shape) - mean
+            step, known = math.copysign(deviation, amplitude), self._shift(name)
+            # At the end of the range the step back stands for the one beyond it.
+            sign = 1.0 if known is None or known.x[0] <= amplitude + step <= known.x[-1] else -1.0
+            more = self.shift(name, np.array(amplitude + sign * step))
+            by_effects[:, p] = sign * (self._together([*still[:k], more, *still[k + 1 :]], mean.shape) - mean)
         loadings = np.concatenate([self.slopes @ np.linalg.cholesky(model.unsure), by_effects], axis=1)
         noise = _white(self.factor, _white(self.factor, self._noise_of(still)).T)
         return _white(self.factor, mean + self.slopes @ model.theta), noise, _white(self.factor, loadings.T).T

@@ -45,6 +45,8 @@ MISTAKEN = 0.01
 """Probability from which an answer counts among those that the given answer may be mistaken for."""
 INTERVAL = 2.0 * 1.96
 """Width of a 95 % interval [standard deviations]."""
+FINE = 1e3
+"""Factor by which numbers of single bodies are multiplied beside features with the noise of a pour."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +122,10 @@ def checked_by_bodies(
     if (bodies := wanted_bodies(measurement, declared, list(acts.values()))) is None:
         return ()
     nothing = Prediction(np.zeros(0), np.zeros((0, 0)))
-    predictions = {label: with_bodies(nothing, np.zeros((0, 0)), acts[label], bodies) for label in weights}
+    predictions = {
+        label: with_bodies(nothing, np.zeros((0, len(one.theta) + len(one.effects))), one, bodies)
+        for label, one in acts.items()
+    }
     # Nothing is poured: all noise is in the predictions.
     (ranked,) = rank_experiments([CandidateExperiment(BODIES_ALONE, predictions)], weights, math.inf)
     return (Suggestion(ranked, {}, measurement.fit[0].name, tuple(weights), (), 0, bodies=bodies.asked),)
@@ -192,7 +197,7 @@ def _item(
 
 
 def acting_in(found: Posterior, label: str) -> ActingModel:
-    """The best fit of ``label``, for single bodies."""
+    """The best fit of ``label``."""
     fit = found.fits[label]
     effects = [(a.effect, a.value, (a.high - a.low) / INTERVAL) for a in fit.amplitudes]
     return ActingModel(effects, fit.theta, fit.theta_covariance)
@@ -201,13 +206,13 @@ def acting_in(found: Posterior, label: str) -> ActingModel:
 def with_bodies(one: Prediction, loadings: FloatArray, acts: ActingModel, bodies: BodyEvidence | None) -> Prediction:
     """Prediction of a pile and of the numbers of single bodies, which depend on the same parameters and amplitudes.
 
-    ``loadings``: shifts of the pile by one standard deviation of each, (d, k + p), not contained in ``one``. Adding a
-    pour's noise to the numbers is slightly too much.
+    ``loadings``: shifts of the pile by one standard deviation of each, (d, k + p), not contained in ``one``.
     """
     if bodies is not None:
+        # In a unit so small that the noise of a pour, which is added to every number, is none.
         mean, noise, more = bodies.predicted(acts)
-        one = Prediction(np.append(one.mean, mean), block_diag(one.covariance, noise))
-        loadings = np.concatenate([loadings.reshape(-1, more.shape[1]), more])
+        one = Prediction(np.append(one.mean, FINE * mean), block_diag(one.covariance, FINE**2 * noise))
+        loadings = np.concatenate([loadings, FINE * more])
     return Prediction(one.mean, one.covariance + loadings @ loadings.T)
 
 
@@ -222,10 +227,10 @@ def _rows(emulator: Emulator, training: TrainingPours, found: Posterior, label: 
         own = [one for one in found.fits[label].amplitudes if one.effect == effect]
         spread = [(one.high - one.low) / INTERVAL / size for one in own]
         if len(own) == 1:
-            acts = {number[training.ways[way].name]: 1.0}
-            first, *others = (
-                emulator.weighted_row([(acts, a)]) - base for a in (amplitude, amplitude + min(spread[0], amplitude))
-            )
+            # A wide step would leave what was poured: the slope over a short one counts for all of it.
+            acts, step = {number[training.ways[way].name]: 1.0}, min(spread[0], amplitude) or 1.0
+            first, more = (emulator.weighted_row([(acts, a)]) - base for a in (amplitude, amplitude + step))
+            others = [first + (more - first) * spread[0] / step]
         else:
             planar = {one.angle: k for k, one in enumerate(emulator.ways) if one.effect == effect}
             x, y = (one.value / size for one in own)

@@ -120,8 +120,10 @@ class Fit:
     z, variance
         Prediction at its best amplitude and parameters, (D,), and the variance of the data about it that is due to
         neither parameters nor instruments, (D,).
+    shift
+        Shift by its effects at their best amplitudes, (D,).
     still
-        Prediction at its best amplitude before the piles are seen, averaged over the parameters, (D,).
+        Prediction there before the piles are seen, averaged over the parameters, (D,).
     unsure
         u, the part of ``variance`` that more pours of the model would remove, (D,).
     log_evidence
@@ -139,6 +141,7 @@ class Fit:
     slopes: FloatArray
     z: FloatArray
     variance: FloatArray
+    shift: FloatArray
     still: FloatArray
     unsure: FloatArray
     log_evidence: float
@@ -463,18 +466,8 @@ class _Weigher:
             for index, value in enumerate(mean_towards(own, best, weights)):
                 interval, end = weighted_interval(own[:, index], weights), bool(nodes.ends[best])
                 amplitudes.append(Amplitude(effect, index, float(value), *interval, end))
-        return Fit(
-            label,
-            tuple(amplitudes),
-            theta,
-            covariance,
-            centre[best],
-            prior,
-            slopes,
-            z,
-            noise,
-            still,
-            self._emulator.at(nodes.rows[here])[1][0],
-            float(logsumexp(weighed)),
-            float(stats.f.sf(square / numbers, numbers, self._freedom)),
-        )
+        (nothing, there), (_, unsure) = self._emulator.at(np.concatenate([self.base.rows, nodes.rows[here]]))
+        of_parameters = theta, covariance, centre[best], prior, slopes
+        p = float(stats.f.sf(square / numbers, numbers, self._freedom))
+        evidence = float(logsumexp(weighed))
+        return Fit(label, tuple(amplitudes), *of_parameters, z, noise, there - nothing, still, unsure, evidence, p)

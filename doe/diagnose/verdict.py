@@ -213,7 +213,7 @@ def _effect_row(compared: Compared, white: FloatArray, label: str, pours: Sequen
     found, emulator = compared.posterior, compared.emulator
     fit, base = found.fits[label], found.fits["base"]
     ways = [number for number, way in enumerate(emulator.ways) if way.effect == label]
-    shift, strength = white @ (fit.still - base.still), 0.0
+    shift, strength = white @ fit.shift, 0.0
     if ways:
         nothing, reference = emulator.at(np.array([emulator.row(), emulator.row({ways[0]: 1.0})]))[0]
         strength = float(np.linalg.norm(white @ (reference - nothing)))
@@ -233,8 +233,7 @@ def _effect_row(compared: Compared, white: FloatArray, label: str, pours: Sequen
 
 
 def _similar(compared: Compared, white: FloatArray) -> tuple[tuple[str, str, float], ...]:
-    fits = compared.posterior.fits
-    shifts = {way.effect: white @ (fits[way.effect].still - fits["base"].still) for way in compared.emulator.ways}
+    shifts = {way.effect: white @ compared.posterior.fits[way.effect].shift for way in compared.emulator.ways}
     names = list(shifts)
     pairs = [(a, b, _cosine(shifts[a], shifts[b])) for k, a in enumerate(names) for b in names[:k]]
     return tuple(sorted(pairs, key=lambda one: -abs(one[2])))

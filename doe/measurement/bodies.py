@@ -36,7 +36,7 @@ from solver import Body, ParameterError, Scene, actual, parse_quantity
 Array = npt.NDArray[np.float64]
 
 COLUMNS = ("body", "quantity", "unit", "mean", "standard_error")
-LEAST_ERROR = 1e-6
+LEAST_ERROR = 1e-5
 """Smallest standard error of a quantity on its scale: no balance is better, and smaller ones give singular evidence."""
 
 

@@ -2,8 +2,8 @@
 
 A scan holds the highest point of the member spheres over every node of a grid, as seen from above and by an oblique
 camera: nodes that the pile hides from the camera are missing (shadow), and so are a few round patches (a reflecting
-grain). Heights have noise, and the stated axis is off by a millimetre or two, equally in all scans of a data set. This
-module shares no code with the reader of the file.
+grain). Heights have noise, and the stated axis is off by a millimetre or two, equally in all scans of a data set, but
+to the other side in the frame of a rig that was turned. This module shares no code with the reader of the file.
 """
 
 from __future__ import annotations

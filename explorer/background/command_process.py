@@ -174,15 +174,15 @@ class CommandProcess:
             if not _locked(log, patience):
                 raise BackgroundError(f"{out}: another page's command is running there; wait until it ends")
             # A session of its own: Ctrl-C for the page must not interrupt a run; cancel() ends it in an orderly way.
-            self._process = subprocess.Popen(
+            process = subprocess.Popen(
                 lowered((*self._program, *arguments), BACKGROUND),
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
             )
-        self.out, self._command = out, arguments[0]
-        session_gives_way(self._process.pid, BACKGROUND)
+        self.out, self._command, self._process = out, arguments[0], process
+        session_gives_way(process.pid, BACKGROUND)
         self._cancelled_at = None
         self._status = CommandStatus("running")
 

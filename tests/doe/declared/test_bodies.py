@@ -175,6 +175,10 @@ def test_a_prediction_knows_how_well_its_amplitude_is_known(data):
     assert loadings == pytest.approx(np.array([[0.0] * k + [math.log(1.15 / 1.1) / 0.01, 0.0]]), rel=0.01)
     *_, lighter = found.predicted(model(k, ("density_error", -0.1, 0.05)))
     assert lighter[0, -1] == pytest.approx(math.log(0.85 / 0.9) / 0.01, rel=0.01)
+    # At the end of the range, where there is no more, a step back stands for it.
+    (end,) = [one.high[0] for one in found.effects if one.name == "density_error"]
+    *_, heaviest = found.predicted(model(k, ("density_error", end, 0.05)))
+    assert heaviest[0, -1] == pytest.approx(math.log((1.0 + end) / (0.95 + end)) / 0.01, rel=0.01)
     assert found.predicted(model(found.slopes.shape[1]))[0] == pytest.approx([0.0])
 
 

@@ -7,13 +7,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy import stats
+from scipy.interpolate import PchipInterpolator
 from scipy.linalg import block_diag
 
 from doe.declared.bodies import ActingModel, BodyEvidence, body_evidence, wanted_bodies
 from doe.declared.budget import Budget
 from doe.declared.model import declare
 from doe.diagnose import diagnosis
-from doe.diagnose.candidate_experiments import acting_in, checked_by_bodies, with_bodies
+from doe.diagnose.candidate_experiments import FINE, acting_in, checked_by_bodies, with_bodies
 from doe.diagnose.compared_features import MeasuredFeatures, weighed
 from doe.diagnose.emulator import Lessons, Way
 from doe.diagnose.next_experiment import DRAWS, CandidateExperiment, Prediction, chance_of_an_answer
@@ -130,24 +131,49 @@ def test_a_follow_up_that_asks_for_bodies_knows_what_they_will_tell(data):
 
 
 def test_a_pile_and_bodies_are_predicted_together(data):
-    """One parameter, with slopes J and K, moves both: Cov = diag(V, N) + (J, K)ᵀ C (J, K)."""
-    slopes, noise, unsure = np.array([[3.0], [-1.0]]), np.diag([1.0, 2.0]), np.array([[0.3]])
-    factor = np.linalg.cholesky(noise + slopes @ slopes.T)
-    bodies = BodyEvidence(None, (None, None), np.zeros(2), slopes, noise, factor, ())
-    pile, of_pile = np.array([[2.0], [0.5], [0.0]]), 0.1 * np.eye(3)
-    acts = ActingModel([], np.array([1.2]), unsure)
-    found = with_bodies(Prediction(np.zeros(3), of_pile), pile @ np.sqrt(unsure), acts, bodies)
+    """Two parameters and a negative amplitude move both: Cov = diag(V, N) + (J, K) C (J, K)ᵀ + S Sᵀ."""
+    slopes, noise = np.array([[3.0, 1.0], [-1.0, 2.0]]), np.diag([1.0, 2.0])
+    unsure, theta = np.array([[0.3, -0.2], [-0.2, 0.4]]), np.array([1.2, -0.5])
+    factor, by_effect = np.linalg.cholesky(noise + slopes @ slopes.T), np.array([20.0, -5.0])
+    at = np.array([-1.0, 0.0, 1.0])
+    shifts = {"density_error": PchipInterpolator(at, np.outer(at, by_effect))}
+    bodies = BodyEvidence(None, (None, None), np.zeros(2), slopes, noise, factor, (), shifts)
+    pile, of_pile = np.array([[2.0, 0.0], [0.5, -1.0], [0.0, 1.0]]), 0.1 * np.eye(3)
+    acts = ActingModel([("density_error", -0.1, 0.05)], theta, unsure)
+    # Away from zero: to a more negative amplitude.
+    more = -0.05 * np.append([7.0, 0.0, 3.0], np.linalg.solve(factor, by_effect))
+    loadings = np.column_stack([pile @ np.linalg.cholesky(unsure), more[:3]])
+    found = with_bodies(Prediction(np.zeros(3), of_pile), loadings, acts, bodies)
     both = np.concatenate([pile, np.linalg.solve(factor, slopes)])
     white = np.linalg.solve(factor, np.linalg.solve(factor, noise).T)
-    assert found.mean == pytest.approx(np.append(np.zeros(3), np.linalg.solve(factor, 1.2 * slopes[:, 0])))
-    assert found.covariance == pytest.approx(block_diag(of_pile, white) + both @ unsure @ both.T)
-    alone = with_bodies(Prediction(np.zeros(3), of_pile), pile @ np.sqrt(unsure), acts, None)
+    covariance = block_diag(of_pile, white) + both @ unsure @ both.T + np.outer(more, more)
+    unit = np.array([1.0, 1.0, 1.0, FINE, FINE])
+    told = np.linalg.solve(factor, slopes @ theta - 0.1 * by_effect)
+    assert found.mean == pytest.approx(unit * np.append(np.zeros(3), told))
+    assert found.covariance == pytest.approx(np.outer(unit, unit) * covariance)
+    alone = with_bodies(Prediction(np.zeros(3), of_pile), loadings, acts, None)
     assert alone.covariance == pytest.approx(found.covariance[:3, :3])
+
+
+def test_numbers_are_predicted_where_nothing_is_calibrated(data):
+    bodies = BodyEvidence(None, (None,), np.zeros(1), np.zeros((1, 0)), np.eye(1), np.eye(1), ())
+    acts = ActingModel([], np.zeros(0), np.zeros((0, 0)))
+    found = with_bodies(Prediction(np.zeros(2), np.eye(2)), np.zeros((2, 0)), acts, bodies)
+    assert found.covariance == pytest.approx(np.diag([1.0, 1.0, FINE**2]))
+    declared = declare(replace(data, parameters=()), tuple(EFFECTS))
+    nothing = known(compared(None).posterior)
+    still = {
+        name: replace(fit, theta=np.zeros(0), theta_covariance=np.zeros((0, 0))) for name, fit in nothing.fits.items()
+    }
+    named = SimpleNamespace(kind="effect:density_error", names=("density_error",))
+    (check,) = checked_by_bodies(named, replace(nothing, fits=still), declared, replace(data, parameters=()))
+    assert check.bodies == (("bead", "mass"),)
 
 
 def test_an_unsure_slope_counts_as_far_as_a_parameter_may_be_off():
     """Var J Σ E θ²: bodies that leave θ ~ N(c, C) make it c² + C of what N(0, 1) makes it."""
-    taught = emulator({}, sensitivity=np.ones(SIZE), moved=1.0)
+    taught, bend = emulator({}, sensitivity=np.ones(SIZE), moved=1.0), 0.1
+    taught.mean[:, -1] = bend
     bare = posterior(taught, Data(np.zeros(SIZE), 6), pairs=False).fits["base"]
     loose = taught.covariance[:, 1, 1]
     for off, slope in ((0.0, 3.0), (6.0, 3.0), (0.0, 0.0)):
@@ -159,7 +185,7 @@ def test_an_unsure_slope_counts_as_far_as_a_parameter_may_be_off():
         square = (slope * off * left) ** 2 + left
         assert fit.variance - bare.variance == pytest.approx(loose * (square - 1.0), rel=1e-6)
         # Before the piles are seen the model predicts what bodies say of the parameter.
-        assert fit.still - bare.still == pytest.approx(taught.slopes[:, 0] * slope * off * left)
+        assert fit.still - bare.still == pytest.approx(taught.slopes[:, 0] * slope * off * left + bend * (square - 1.0))
 
 
 def known(found):

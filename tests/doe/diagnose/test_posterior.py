@@ -573,7 +573,7 @@ def test_what_pours_could_gain_by_hand():
     def fit(z, prior=1.0):
         none = np.zeros((2, 1))
         known, noise = (np.zeros(1), np.eye(1), np.zeros(1), prior * np.eye(1)), np.full(2, 2.0)
-        return Fit("", (), *known, none, np.array(z), noise, np.array(z), np.ones(2), 0.0, 0.5)
+        return Fit("", (), *known, none, np.array(z), noise, np.zeros(2), np.array(z), np.ones(2), 0.0, 0.5)
 
     taught = SimpleNamespace(slopes=np.zeros((2, 1)))
     plain, blurred = (Data(np.zeros(2), 1.0, instrument=np.diag([size, 0.0])) for size in (0.0, math.sqrt(8.0)))

@@ -22,7 +22,7 @@ def posterior(nothing, outside, effects, badly=(), base=DOUBTED / 2.0, off=3.0):
     none = np.zeros(0)
     likely = {"base": base} | dict.fromkeys(effects, 0.5) | dict.fromkeys(badly, 0.1 * FITS)
     theta = np.array([off])
-    fits = {label: Fit(label, (), theta, *[none] * 8, 0.0, likely[label]) for label in ("base", *effects)}
+    fits = {label: Fit(label, (), theta, *[none] * 9, 0.0, likely[label]) for label in ("base", *effects)}
     return Posterior(nothing, outside, effects, fits, (), 0.0)
 
 
@@ -203,3 +203,6 @@ def test_strengths_know_what_bodies_say_of_the_parameters():
         (effect,) = verdict_of(compared, declared, (200,), followed_up=False).effects
         noise = compared.data.scatter / 6.0
         assert effect.strength == pytest.approx(1.0 / np.sqrt(noise + left), rel=0.15), slope
+        # Another emulator's prediction of the base model is no shift by an effect.
+        (again,) = verdict_of(compared.refitted(["base"]), declared, (200,), followed_up=False).effects
+        assert again.fitted_strength == effect.fitted_strength
