@@ -46,10 +46,11 @@ PLAIN = (
     "_began",
     "_left",
     "_ramp_left",
+    "disturbed",
 )
 """Parts of a pour that are numbers, text, or lists of them."""
 HEAD = "pour.json"
-DISTURBED = ("_motion", "_motion_left", "_pull", "disturbed")
+DISTURBED = ("_motion", "_motion_left", "_pull")
 DECIDED = (
     *(name for name in PLAIN if name != "samples"),
     *("ended", "outcome", "message", "_table", "_ramp", "_inside"),

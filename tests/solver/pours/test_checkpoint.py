@@ -66,6 +66,14 @@ def test_a_change_of_stiffness_goes_on_where_it_was():
     same(drive(resumed(batch, 0, stiffer, kept)).record(), whole)
 
 
+def test_a_pour_that_was_disturbed_stays_so():
+    batch = Batch(capacity_for([HEAP], 1))
+    pour = drive(Pour(batch, 0, HEAP, 5), until=0.1)
+    assert not resumed(batch, 0, HEAP, checkpoint_of(pour)).disturbed
+    pour.disturbed = True
+    assert resumed(batch, 0, HEAP, checkpoint_of(pour)).disturbed
+
+
 def test_a_pour_that_was_interrupted_after_its_end_gives_its_record():
     batch = Batch(capacity_for([HEAP], 1))
     pour = drive(Pour(batch, 0, HEAP, 5))
