@@ -117,9 +117,8 @@ def directions_of(effect: CandidateEffect) -> list[Direction]:
             )
             for k, (sign, (a, b)) in enumerate(zip(signs, ends, strict=True))
         ]
-    if effect.low[0] < 0.0:
-        return [Direction(name, f"{name} +", effect.high), Direction(name, f"{name} -", effect.low)]
-    return [Direction(name, name, effect.high)]
+    sides = [(sign, end) for sign, end in (("+", effect.high), ("-", effect.low)) if end[0] != 0.0]
+    return [Direction(name, f"{name} {sign}" if len(sides) == 2 else name, end) for sign, end in sides]
 
 
 def moved(declared: Declared, number: int) -> tuple[float, ...]:

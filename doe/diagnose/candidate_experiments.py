@@ -167,6 +167,8 @@ def _item(
     """Predictions of every answer in a set-up, by a separate regression; StatisticsError if too few pours ended."""
     offered = feature_set(set_up).offered(offer_of(set_up))
     taught, (columns,) = usable(lessons, [np.arange(offered)])
+    if columns.size == 0:
+        raise StatisticsError(f"{set_up.name}: no number varies in the pours and can be read")
     used = sorted(set(taught.way[taught.way >= 0].tolist()))
     if missing := set(lessons.way.tolist()) - {-1, *used}:
         raise StatisticsError(f"{training.ways[missing.pop()].name}: none of its pours is valid")

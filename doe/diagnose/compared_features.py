@@ -224,7 +224,7 @@ def _readable(lessons: Lessons, c: int) -> npt.NDArray[np.bool_]:
     base = lessons.blocks[c][lessons.way == -1]
     # A pour that broke off says nothing about any feature.
     ended = np.isfinite(base).any(axis=1)
-    return np.asarray(np.isfinite(base[ended]).mean(axis=0) >= READABLE)
+    return np.asarray(np.isfinite(base[ended]).sum(axis=0) >= READABLE * max(1, ended.sum()))
 
 
 def _complete(lessons: Lessons) -> Lessons:

@@ -192,14 +192,15 @@ def _settled(
     for _ in range(budget.looks):
         found = compared.posterior
         name, p = found.best if found.effects else ("", 0.0)
-        quiet = NOTHING_FROM if name in looked else QUIET
-        held = (held if name == before else 0) + 1 if p >= THRESHOLD and name in looked else 0
+        named, seen = set(name.split("+")), set(name.split("+")) <= looked
+        quiet = NOTHING_FROM if seen else QUIET
+        held = (held if name == before else 0) + 1 if p >= THRESHOLD and seen else 0
         before = name
         settled = found.nothing >= quiet or (held > 0 and p >= SETTLED) or held >= HELD
-        if not any(training.ways[way].effect == name for way, _ in training.at_end(found)):
+        if not any(training.ways[way].effect in named for way, _ in training.at_end(found)):
             if settled:
                 break
-            if name in looked and (rival := inseparable(compared, name)):
+            if seen and (rival := inseparable(compared, name)):
                 say(f"no pours can tell {name} from {rival}: they differ by less than the noise of the data")
                 break
         poured = training.look(found)
@@ -244,6 +245,10 @@ def concluded(
     data = [replicates_of(conditions[c]) for c in places]
     fit = 1.0 if verdict.kind.startswith("ambiguous") else fits[verdict.final].p
     told = held_out(verdict.final, data, [after.blocks[c] for c in places], fit)
+    if told is not None and verdict.kind.startswith("ambiguous") and NO_EFFECT in verdict.kind:
+        # "Nothing missing" is left as well, and stands as long as they do not contradict it.
+        nothing = held_out(BASE, data, [before.blocks[c] for c in places])
+        told = told if nothing is None else max(told, nothing, key=lambda one: one.together)
     if told is not None and told.together < CONTRADICTED and (verdict.names or verdict.kind == NO_EFFECT):
         verdict = taken_back(verdict, f"{told.summary} of {told.condition} is {told.farthest:.1f} standard errors off")
         say(f"with held-out data: {verdict.kind}")

@@ -51,11 +51,13 @@ def level_of(
 ) -> Search[Level]:
     """Find the level of ``direction``; share 1 if the whole range shifts less. ``points(share, number)``: its pours."""
     share, below, above = 1.0, 0.0, math.inf
-    level = Level(direction, 1.0, math.inf)
+    level = ended = Level(direction, 1.0, math.inf)
     for _ in range(trials.most):
         pours = yield points(share, trials.pours)
         shift = whitened_shift(declared, base, pours)
         level = Level(direction, share, shift)
+        if math.isfinite(shift) and (math.isinf(ended.shift) or share > ended.share):
+            ended = level
         if shift > trials.too_much:
             above = share
             inward = share * max(LEAST_STEP, STRONG / shift)
@@ -66,7 +68,8 @@ def level_of(
             share = min(1.0, outward if math.isinf(above) else min(outward, math.sqrt(below * above)))
         else:
             break
-    return level
+    # Where nothing ended, nothing can be taught; the widest amplitude at which something did is nearest.
+    return ended if math.isinf(level.shift) else level
 
 
 def whitened_shift(declared: Declared, base: Rows, moved: Rows) -> float:

@@ -104,12 +104,12 @@ class TrainingPours:
         base = base_points(declared, budget.base)
         self._keep(base, pours.run("base model", base), -1, 0.0)
         self._base = [self._rows[point] for point in base]
-        valid = min(sum(row[c].valid for row in self._base) for c in range(len(conditions)))
+        valid = sum(all(pour.valid for pour in row) for row in self._base)
         if valid < max(4, len(base) // 3):
             outcomes = sorted({pour.outcome for row in self._base for pour in row if not pour.valid})
             raise StatisticsError(
-                f"base model: {valid} of {len(base)} pours end in a valid pile (the others: {', '.join(outcomes)}); "
-                "the declared model does not reproduce the experiment"
+                f"base model: {valid} of {len(base)} pours end in a valid pile in every condition (the others: "
+                f"{', '.join(outcomes)}); the declared model does not reproduce the experiment"
             )
         say(f"base model: {len(base)} settings")
         self._levels = self._found_levels()
@@ -181,14 +181,11 @@ class TrainingPours:
     def refine(self, found: Posterior, label: str) -> None:
         """Pour the effects of ``label`` on both sides of their best fits, so that these are no extrapolations."""
         wanted = []
-        for name in label.split("+"):
-            level = max(
-                (one for one in found.levels if self.ways[one.way].effect == name), key=lambda one: one.log_density
-            )
-            power = math.log2(level.amplitude)
+        for way, amplitude in acting(found, label, self.ways):
+            power = math.log2(amplitude)
             for one in (math.floor(power), math.ceil(power)):
-                multiple = min(2.0**one, self.ways[level.way].most)
-                wanted.append((level.way, multiple, max(self._taught(level.way, multiple), self._budget.more)))
+                multiple = min(2.0**one, self.ways[way].most)
+                wanted.append((way, multiple, max(self._taught(way, multiple), self._budget.more)))
         self._pour("refinement", wanted)
 
     def lessons(self) -> Lessons:
@@ -215,9 +212,7 @@ class TrainingPours:
         for label in labels:
             for way, multiple in acting(found, label, self.ways):
                 nearest = min(2.0 ** round(math.log2(multiple)), self.ways[way].most)
-                # An effect that is poured in all directions of the plane needs them all.
-                same = self._all_of(way) if self.ways[way].angle is not None else [way]
-                wanted |= {(one, nearest): None for one in same}
+                wanted |= {(one, nearest): None for one in self._alike(way)}
         return [
             Probe(point, way, multiple)
             for way, multiple in wanted
@@ -296,18 +291,20 @@ class TrainingPours:
             share = min(1.0, level.share * STRONG / max(level.shift, TOLD))
             if way in refused:
                 share = min(share, math.sqrt(level.share * refused[way]))
-            for one in self._all_of(way) if direction.angle is not None else [way]:
+            for one in self._alike(way):
                 asked[one] = share, self._points(self._directions[one], share, self._budget.screening)
         self._pours.run("screening", list({p.seen(AS_IT_IS): None for _, points in asked.values() for p in points}))
+        rows = {way: self._pours.run("screening", points) for way, (_, points) in asked.items()}
+        ended = {way: np.mean([all(pour.valid for pour in row[:first]) for row in some]) for way, some in rows.items()}
         for way, (share, points) in asked.items():
-            rows = self._pours.run("screening", points)
-            if np.mean([all(pour.valid for pour in row[:first]) for row in rows]) < ENDED:
+            # All directions in the plane share one level.
+            if any(ended[one] < ENDED for one in self._alike(way)):
                 refused[way] = share
                 continue
             outward = share / self._levels[way].share
             self._acting |= {p: (w, a / outward) for p, (w, a) in self._acting.items() if w == way}
             self._levels[way] = replace(self._levels[way], share=share)
-            self._keep(points, rows, way, 1.0)
+            self._keep(points, rows[way], way, 1.0)
         return bool(asked)
 
     def _keep_trials(self) -> None:
@@ -336,8 +333,7 @@ class TrainingPours:
         """
         asked: list[tuple[int, float, Sequence[Point]]] = [(-1, 0.0, base)]
         for way, multiple, number in wanted:
-            angle = self.ways[way].angle
-            for w in [way] if angle is None else self._all_of(way):
+            for w in self._alike(way):
                 share = min(1.0, multiple * self._levels[w].share)
                 asked.append((w, share / self._levels[w].share, self._points(self._directions[w], share, number)))
         plain = dict.fromkeys(point.seen(AS_IT_IS) for _, _, points in asked for point in points)
@@ -345,10 +341,10 @@ class TrainingPours:
         for way, multiple, points in asked:
             self._keep(points, self._pours.run(what, points), way, multiple)
 
-    def _all_of(self, way: int) -> list[int]:
-        """Indices of all ways of the effect of ``way``."""
-        effect = self._directions[way].effect
-        return [number for number, one in enumerate(self._directions) if one.effect == effect]
+    def _alike(self, way: int) -> list[int]:
+        """``way``, and the other directions of an effect in the plane, all of which it needs at one level."""
+        own = self._directions[way]
+        return [way] if own.angle is None else [k for k, one in enumerate(self._directions) if one.effect == own.effect]
 
     def _keep(self, points: Sequence[Point], rows: Sequence[list[PointPour]], way: int, multiple: float) -> None:
         for point, row in zip(points, rows, strict=True):

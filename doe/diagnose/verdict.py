@@ -175,9 +175,8 @@ def verdict_of(compared: Compared, declared: Declared, pours: Sequence[int], fol
     final = names[0] if names else "base"
     before, after = found.fits["base"], found.fits[final]
     white = _recalibrated(compared)
-    rows = sorted(found.effects, key=lambda one: -found.effects[one])
-    likely = _likely_pairs(found)
-    rows = [label for label in rows if "+" not in label or label in likely]
+    likely, order = _likely_pairs(found), sorted(found.effects, key=lambda one: -found.effects[one])
+    rows = [label for label in order if "+" not in label or label in likely]
     return Verdict(
         kind=kind,
         names=names,

@@ -57,7 +57,8 @@ class CampaignOrder:
     """Settings of a campaign.
 
     minutes: time limit, infinite by default; 0: judge nothing. scheduler: address of the Dask scheduler whose workers
-    pour. shard: take every ``of``-th set, starting with the ``shard``-th. wide: sets of all strengths, for development.
+    pour. shard: take every ``of``-th set, starting with the ``shard``-th. only: numbers of the sets to judge, all if
+    empty. wide: sets of all strengths, for development.
     follow_up: whether the measurements that an answer asks for are made, which takes most of the time. cases: replace
     the scheduled ones. strengths: replace those measured by the laboratory's reference pours.
     """
@@ -71,6 +72,7 @@ class CampaignOrder:
     scheduler: str = ""
     shard: int = 1
     of: int = 1
+    only: tuple[int, ...] = ()
     wide: bool = False
     follow_up: bool = True
     laboratory: Path = TREFOILS
@@ -80,10 +82,10 @@ class CampaignOrder:
     strengths: Strengths | None = None
 
     def asked(self, laboratory: Laboratory) -> tuple[Case, ...]:
-        """The cases of this shard."""
+        """The cases of this shard, or those of them that are asked for."""
         kinds = possible_outside(laboratory.declared.scene, development=self.wide)
         found = self.cases or tuple(cases(self.root, self.number, kinds, self.wide))
-        return found[self.shard - 1 :: self.of]
+        return tuple(case for case in found[self.shard - 1 :: self.of] if not self.only or case.number in self.only)
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,9 @@ def validate_diagnosis(
         metavar="K/N",
         help="Process only every N-th data set, from the K-th on; N processes can share --out and --store.",
     ),
+    sets: str = typer.Option(
+        "", metavar="N,N,…", help="Process only the data sets with these numbers, counted from 0 to --n less one."
+    ),
     wide: bool = typer.Option(False, "--wide", help="Data sets with effects of 4 to 40 σ, for development."),
     follow_up: bool = typer.Option(
         True, "--follow-up/--no-follow-up", help="Carry out the experiment that an answer asks for."
@@ -59,6 +62,9 @@ def validate_diagnosis(
     number, _, of = shard.partition("/")
     if not (number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of)):
         raise CommandError(f"--shard {shard}: allowed: K/N with 1 ≤ K ≤ N, such as 1/2")
+    numbers = [one.strip() for one in sets.split(",")] if sets else []
+    if not all(one.isdecimal() and int(one) < n for one in numbers):
+        raise CommandError(f"--sets {sets}: allowed: numbers from 0 to {n - 1}, separated by commas")
     order = CampaignOrder(
         out=out,
         number=n,
@@ -68,6 +74,7 @@ def validate_diagnosis(
         workers=threads,
         shard=int(number),
         of=int(of),
+        only=tuple(map(int, numbers)),
         wide=wide,
         follow_up=follow_up,
         scheduler=scheduler,

@@ -123,6 +123,11 @@ def test_two_shards_are_the_campaign(order, rows, tmp_path):
     assert numbers(run_campaign(dataclasses.replace(order, out=tmp_path), print)) == numbers(rows)
 
 
+def test_single_sets_are_judged_alone(order, rows, tmp_path):
+    found = run_campaign(dataclasses.replace(order, out=tmp_path, only=(2, 0)), print)
+    assert numbers(found) == numbers([*rows[0:2], *rows[4:6]])
+
+
 def test_time_that_is_over_stops_it_cleanly(order, tmp_path):
     said = []
     late = dataclasses.replace(order, out=tmp_path, store=tmp_path / "empty.sqlite", minutes=1e-4)

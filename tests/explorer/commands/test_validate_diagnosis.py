@@ -38,6 +38,14 @@ def test_a_shard_that_there_is_not_is_refused(tmp_path):
         assert "allowed: K/N" in result.output
 
 
+def test_sets_that_there_are_not_are_refused(tmp_path):
+    for sets in ("2", "0,one", "-1", "0,,1"):
+        result = explorer("validate-diagnosis", "--n", "2", "--out", str(tmp_path / "out"), "--sets", sets)
+        assert result.exit_code != 0
+        assert f"--sets {sets}: allowed: numbers from 0 to 1" in result.output
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_wrong_laboratory_leaves_nothing_behind(tmp_path):
     result = explorer("validate-diagnosis", "--out", tmp_path / "out", "--laboratory", tmp_path / "none.toml")
     assert (result.exit_code, result.stdout) == (2, "")
