@@ -18,11 +18,11 @@ instrument, s_after^2/k + u^2 with the stated uncertainty u.
 
 An answer is tested on the summary of the smallest p over all held-out conditions, where
 
-    |t| = |measured − poured| / (s √(1/(k r) + 1/m))
+    |t| = |measured − poured| / √(s² (1/(k r) + 1/m) + u²)
 
-with r measured replicates, each the mean of k pours, and m fresh pours, s pooled over both and f = r + m − 2 degrees of
-freedom. For a single replicate s is that of the fresh pours alone, the denominator is √(s² (1/k + 1/m) + u²), and the
-degrees of freedom are f (1 + u²/(s² (1/k + 1/m)))² (Welch and Satterthwaite, doi 10.2307/3002019). Bonferroni's
+with r measured replicates, each the mean of k pours, and m fresh pours, s pooled over both (for a single replicate that
+of the fresh pours alone) and f = r + m − 2. The degrees of freedom are f (1 + u²/(s² (1/(k r) + 1/m)))² (Welch and
+Satterthwaite, doi 10.2307/3002019). As in the fit, an instrument errs equally in all replicates. Bonferroni's
 p = (number of summaries) P(|t_f| ≥ |t|) tests each summary by itself, because a missing effect shows in the summaries
 on which it acts, not evenly in all. It is combined with p₀, the probability that fitted data lie as far from the same
 model: the held-out data contradict the answer if Fisher's P = q (1 − ln q), q = p p₀, is below ``CONTRADICTED``
@@ -64,7 +64,7 @@ class MeasuredReplicates:
     values
         Replicates (r, d).
     stated
-        Standard uncertainty of a replicate (d,), 0 where none is stated; used if there is only one replicate.
+        Standard uncertainty of a replicate (d,), 0 where none is stated; of several it enters the test alone.
     mean_of
         Number of pours of which each replicate is the mean.
     """
@@ -262,7 +262,7 @@ def held_out(
             continue
         asked += int(varies.sum())
         scatter = np.where(varies, spread, 1.0) ** 2 * (one.share / r + 1 / m)
-        variance = scatter + one.instrument**2
+        variance = scatter + one.stated**2
         off = np.where(varies, np.abs(one.values.mean(axis=0) - block.mean(axis=0)), 0.0)
         t = off / np.sqrt(variance)
         tails = stats.t.sf(t, (r + m - 2) * (variance / scatter) ** 2)

@@ -144,6 +144,15 @@ def test_several_readings_by_hand():
     assert found.p == pytest.approx(2.0 * stats.t.sf(4.0 / 1.5, 2))
 
 
+def test_an_instrument_errs_equally_in_all_replicates():
+    """As above with u = 2: 9/4 + 4 = 25/4, f = 2 (25/9)²."""
+    one = MeasuredReplicates("mean", ("mass",), np.array([[4.0], [6.0]]), np.array([2.0]), 2)
+    found = held_out("base", [one], [np.array([[0.0], [2.0]])])
+    assert found is not None
+    assert found.farthest == pytest.approx(4.0 / 2.5)
+    assert found.p == pytest.approx(2.0 * stats.t.sf(1.6, 2.0 * (25.0 / 9.0) ** 2))
+
+
 def test_the_p_of_the_farthest_counts_all_that_were_asked():
     """Three numbers of two conditions, equal pours: the farthest by t with four degrees of freedom, times three."""
     pours = np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])
