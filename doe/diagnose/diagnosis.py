@@ -274,6 +274,9 @@ def suggested(
     if not verdict.kind.startswith("ambiguous"):
         return CandidateExperiments(checked_by_bodies(verdict, found, training.declared, measurement), 0)
     weights = {label: found.effects[label] for label in verdict.names[:MOST_RIVALS]}
+    if any("+" in label and p >= THRESHOLD for label, p in weights.items()):
+        # Their probability rests on the sum of two effects, which is what another set-up has to show: all count alike.
+        weights = dict.fromkeys(weights, 1.0 / len(weights))
     if NO_EFFECT in verdict.kind or len(weights) < 2:
         weights[BASE] = found.nothing
     answers = [acting_in(found, label) for label in dict.fromkeys((*verdict.names, *weights))]
@@ -295,9 +298,7 @@ def offered(condition: Condition, c: int, compared: Compared) -> Offered:
 
 def errors_of(conditions: Sequence[Condition], role: str, found: Conclusion) -> tuple[HoldoutError, ...]:
     """Errors over the conditions of ``role``, except those without a measured replicate or two pours of each model."""
-    compared = []
-    for c, condition in enumerate(conditions):
-        measured, poured = replicates_of(condition), (found.before.blocks[c], found.after.blocks[c])
-        if condition.role == role and len(measured.values) and min(map(len, poured)) >= 2:
-            compared.append(HoldoutCondition(measured, *poured))
+    of_role = [(condition, c) for c, condition in enumerate(conditions) if condition.role == role]
+    every = [(replicates_of(one), found.before.blocks[c], found.after.blocks[c]) for one, c in of_role]
+    compared = [HoldoutCondition(*one) for one in every if len(one[0].values) and min(map(len, one[1:])) >= 2]
     return holdout_errors(compared) if compared else ()

@@ -112,16 +112,6 @@ class Lessons:
     def __len__(self) -> int:
         return len(self.way)
 
-    def joined(self, other: Lessons) -> Lessons:
-        """Return these pours followed by ``other``."""
-        return Lessons(
-            np.concatenate([self.theta, other.theta]),
-            np.concatenate([self.way, other.way]),
-            np.concatenate([self.amplitude, other.amplitude]),
-            np.concatenate([self.own, other.own]),
-            tuple(np.concatenate(pair) for pair in zip(self.blocks, other.blocks, strict=True)),
-        )
-
     def only(self, columns: Sequence[npt.NDArray[np.int64]]) -> Lessons:
         """Return the pours with only the features ``columns`` of each condition."""
         kept = tuple(block[:, some] for block, some in zip(self.blocks, columns, strict=True))

@@ -5,7 +5,8 @@ all answers that are still possible, which may include ``no_missing_effect`` and
 
     something is named     if it is the most probable effect or pair, its probability is at least ``THRESHOLD``
                            (after a follow-up, which cannot tell what acts with it: alone or with others), the data
-                           are likely under it (``FITS``), and the declared model is in doubt (``DOUBTED``)
+                           are likely under it (``FITS``), and the declared model is in doubt (``DOUBTED``); two
+                           effects after a follow-up only, for in one set-up their sum may look like other effects
     no_missing_effect      if its probability is at least ``NOTHING_AT_ONCE``, or ``NOTHING_FROM`` after a follow-up
     unexplained            if something outside the library is the most probable, or no remaining model fits
     ambiguous              otherwise: the smallest set that holds ``CREDIBLE``
@@ -97,6 +98,10 @@ def answer(found: Posterior, followed_up: bool) -> tuple[str, tuple[str, ...], s
     name, sure = candidate(found, followed_up)
     p, doubted = found.effects.get(name, 0.0), in_doubt(found, sure)
     if doubted and sure >= THRESHOLD and found.fits[name].p >= FITS:
+        if "+" in name and not followed_up:
+            names = tuple(sorted(found.effects, key=lambda one: -found.effects[one])[:2])
+            text = f"{_spoken(name)} would explain the data ({_percent(p)}); another set-up has to show the same."
+            return f"ambiguous:{','.join(names)}", names, text
         kind = f"effects:{name}" if "+" in name else f"effect:{name}"
         beside = "" if p >= THRESHOLD else f", alone ({_percent(p)}) or with another effect"
         text = f"{_spoken(name)} explains what the declared model cannot, with probability {_percent(sure)}{beside}."

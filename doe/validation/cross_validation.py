@@ -207,13 +207,22 @@ class _Split:
         return places
 
     def _taught(self, counts: Mapping[tuple[int, str], int]) -> Emulator:
-        lessons = self._base[0]
-        for more in self._base[1:]:
-            lessons = lessons.joined(more)
+        lessons, middle = [*self._base], np.zeros(self._base[0].theta.shape[1])
         for (way, level), number in counts.items():
             pours = _first(self.pours[f"{self._ways[way].name} {level}"], number)
-            lessons = lessons.joined(_lesson(pours, np.zeros(lessons.theta.shape[1]), way, LEVELS[level]))
-        return emulated(lessons, self._ways)
+            lessons.append(_lesson(pours, middle, way, LEVELS[level]))
+        return emulated(joined(lessons), self._ways)
+
+
+def joined(lessons: Sequence[Lessons]) -> Lessons:
+    """All of ``lessons``, one after the other."""
+    return Lessons(
+        np.concatenate([one.theta for one in lessons]),
+        np.concatenate([one.way for one in lessons]),
+        np.concatenate([one.amplitude for one in lessons]),
+        np.concatenate([one.own for one in lessons]),
+        tuple(np.concatenate(blocks) for blocks in zip(*(one.blocks for one in lessons), strict=True)),
+    )
 
 
 def _lesson(blocks: Blocks, theta: FloatArray, way: int = -1, amplitude: float = 0.0) -> Lessons:

@@ -50,6 +50,7 @@ class Rule(Record):
     """Constants of the rule, for the report (`doe.diagnose`); ``doubted``: 1 in results older than this constant.
 
     ``together``: whether ``contradicted`` is of fitted and held-out data together; in older ones, of the latter alone.
+    ``pairs_at_once``: whether two effects may be named without a follow-up, as in older ones.
     """
 
     prior_nothing: float
@@ -63,6 +64,7 @@ class Rule(Record):
     strong: float
     doubted: float = 1.0
     together: bool = False
+    pairs_at_once: bool = True
 
 
 @dataclass(frozen=True)

@@ -71,6 +71,7 @@ RULE = Rule(
     strong=STRONG,
     doubted=DOUBTED,
     together=True,
+    pairs_at_once=False,
 )
 
 

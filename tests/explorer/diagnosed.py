@@ -238,7 +238,8 @@ def diagnosed(
     lessons = lessons_of(world, declared, levels, draw)
     compared = weighed(lessons, ways, offers)
     taught = [int((lessons.way == w).sum()) for w in range(len(ways))]
-    verdict = verdict_of(compared, declared, taught, followed_up=False)
+    # Two effects are named by a follow-up only.
+    verdict = verdict_of(compared, declared, taught, followed_up=len(effects) > 1)
     fresh = FormulaPours(world, declared, ways, conditions, draw)
     found, verdict = concluded(verdict, compared, declared, conditions, fresh, lambda line: None)
     return measurement, Diagnosis(

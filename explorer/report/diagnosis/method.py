@@ -167,6 +167,7 @@ def how_reached(result: DiagnosisResult) -> Section:
             "answer back where fitted and held-out data together (Fisher; the farthest held-out summary, corrected for "
             f"their number) are as far off it as in less than {percent(result.rule.contradicted)} of cases."
         )
+    pairs = "" if result.rule.pairs_at_once else ", a pair by a follow-up only,"
     features = sum(row.features for row in result.offered)
     lines = (
         f"The same {features} features are read from measured and simulated piles. Their far tails are drawn in, and "
@@ -180,8 +181,8 @@ def how_reached(result: DiagnosisResult) -> Section:
         f"and from the priors: {rule['prior_nothing']} for nothing missing, {rule['prior_outside']} for something "
         f"outside the library, {rule['prior_pairs']} for pairs, the rest for single effects. The temperature is "
         f"{number(result.temperature)}; below 1 the answer is less sure than the evidence says.",
-        f"The most probable effect or pair is named if it reaches {percent(result.threshold)} (after a follow-up, "
-        "which could not tell what is beside it: alone and with others together) and the data are likely under it "
+        f"The most probable effect or pair{pairs} is named if it reaches {percent(result.threshold)} (after a "
+        "follow-up, which could not tell what is beside it: alone and with others together) and the data are likely under it "
         f"(p ≥ {rule['fits']}){doubted}. "
         f"Else nothing is missing if that has {percent(result.rule.nothing_at_once)} or more "
         f"({percent(result.rule.nothing_from)} after a follow-up), unexplained if something outside is the most "

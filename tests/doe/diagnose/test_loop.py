@@ -187,11 +187,21 @@ def test_an_effect_far_beyond_the_first_level_is_followed(measurement, monkeypat
     assert level.share < 0.4
 
 
-def test_two_effects_at_once_are_named_together(measurement, monkeypatch):
+def test_two_effects_at_once_ask_for_another_set_up_before_they_are_named(measurement, monkeypatch):
+    both = "rolling_resistance+density_error"
     planted = (("rolling_resistance", (0.6 * EFFECTS["rolling_resistance"].strongest,)), ("density_error", (0.2,)))
     found, said = run(measurement, monkeypatch, planted)
-    assert found.verdict.kind == "effects:rolling_resistance+density_error", said
+    assert found.verdict.kind.startswith(f"ambiguous:{both},"), said
     assert {name for name, _ in found.after.model.effects} == {"rolling_resistance", "density_error"}
+    first = found.suggestions[0]
+    assert first.pours > 0
+    assert first.rivals[0] == both
+    # Both answers count alike, though one is all but certain.
+    assert first.experiment.chance > 0.9
+    before = replace(measurement, conditions=measurement.fit[:0])
+    measure(monkeypatch, planted, 1)
+    again = diagnosis.run_diagnosis(measurement, None, None, NAMES, BUDGET, said.append, follow_up=before)
+    assert again.verdict.kind == f"effects:{both}", said
 
 
 def not_adding(theta, effects, condition, width):

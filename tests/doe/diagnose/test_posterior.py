@@ -36,7 +36,7 @@ from doe.diagnose.posterior import (
     posterior,
 )
 from doe.errors import StatisticsError
-from doe.validation.cross_validation import NULLS, PlantedTruth, Teaching, cross_validated
+from doe.validation.cross_validation import NULLS, PlantedTruth, Teaching, cross_validated, joined
 from doe.validation.limit import RISKS, DataKind
 from tests.doe.validation.test_limit_ruler import D, sample_of, unit
 
@@ -365,10 +365,7 @@ def lessons_of(sample, ways):
         theta = {"friction_0 -": -1.5, "friction_0 +": 1.5}.get(kind, 0.0)
         way, amplitude = ways.get(kind, (-1, 0.0))
         parts.append(Lessons(np.full((n, 1), theta), np.full(n, way), np.full(n, amplitude), np.ones(n, bool), blocks))
-    found = parts[0]
-    for part in parts[1:]:
-        found = found.joined(part)
-    return found
+    return joined(parts)
 
 
 def test_the_emulator_is_taught_by_pours():
@@ -461,9 +458,7 @@ def test_a_pour_looked_at_otherwise_tells_nothing_of_the_scatter():
     sample = sample_of(np.random.default_rng(0), {"push": 4.0 * unit(2)})
     lessons = lessons_of(sample, {"push": (0, 1.0)})
     copies = lessons.where(lessons.way == 0)
-    again = lessons.joined(
-        Lessons(copies.theta, copies.way, copies.amplitude, np.zeros(len(copies), bool), copies.blocks)
-    )
+    again = joined([lessons, replace(copies, own=np.zeros(len(copies), bool))])
     one, other = (emulated(some, [Way("push", "push")]) for some in (lessons, again))
     assert one.freedom == other.freedom
 

@@ -64,6 +64,18 @@ def test_after_a_follow_up_what_is_in_all_answers_is_named(found, kind, at_once)
     assert answer(found, followed_up=False)[0] == at_once
 
 
+@pytest.mark.parametrize("effects", [{"a+b": 0.97, "a+c": 0.01, "b": 0.005}, {"a+b": 0.97, "b": 0.005, "a+c": 0.001}])
+def test_two_effects_are_named_where_another_set_up_has_shown_the_same(effects):
+    """At once their sum may come nearest to two others (root 6, set 6): the next most probable answer is left too."""
+    found, (pair, next_one, _) = posterior(0.005, 0.005, effects), effects
+    kind, names, text = answer(found, followed_up=False)
+    assert (kind, names) == (f"ambiguous:{pair},{next_one}", (pair, next_one))
+    assert text == "a with b would explain the data (97 %); another set-up has to show the same."
+    assert answer(found, followed_up=True)[:2] == ("effects:a+b", ("a+b",))
+    badly = posterior(0.005, 0.005, effects, ["a+b"])
+    assert answer(badly, followed_up=False)[0] == answer(badly, followed_up=True)[0] == UNEXPLAINED
+
+
 def test_a_name_says_whether_it_is_alone():
     assert answer(posterior(0.02, 0.01, ALONE), followed_up=True)[2] == (
         "a explains what the declared model cannot, with probability 95 %, alone (50 %) or with another effect."
