@@ -182,8 +182,8 @@ def how_reached(result: DiagnosisResult) -> Section:
         f"outside the library, {rule['prior_pairs']} for pairs, the rest for single effects. The temperature is "
         f"{number(result.temperature)}; below 1 the answer is less sure than the evidence says.",
         f"The most probable effect or pair{pairs} is named if it reaches {percent(result.threshold)} (after a "
-        "follow-up, which could not tell what is beside it: alone and with others together) and the data are likely under it "
-        f"(p ≥ {rule['fits']}){doubted}. "
+        "follow-up, which could not tell what is beside it: alone and with others together) and the data are likely "
+        f"under it (p ≥ {rule['fits']}){doubted}. "
         f"Else nothing is missing if that has {percent(result.rule.nothing_at_once)} or more "
         f"({percent(result.rule.nothing_from)} after a follow-up), unexplained if something outside is the most "
         "probable, and ambiguous otherwise: the smallest set of answers that holds "
