@@ -17,20 +17,10 @@ from doe.diagnose.training_amplitudes import level_of
 from doe.diagnose.training_pours import TRIALS, TrainingPours
 from doe.errors import StatisticsError
 from doe.holdout import MeasuredReplicates
-from doe.measurement import load_measurement
 from solver import EFFECTS
-from solver.assets import measurement_folder
 from tests.doe.diagnose.test_loop import BUDGET, NAMES, FormulaPours, acting, measure, too_small, twins
 
 pytestmark = pytest.mark.usefixtures("plates")
-
-
-@pytest.fixture
-def measurement(monkeypatch):
-    monkeypatch.setattr(diagnosis, "ModelPours", FormulaPours)
-    found = load_measurement(measurement_folder("trefoil_1"))
-    monkeypatch.setattr(FormulaPours, "declared", declare(found, NAMES))
-    return found
 
 
 def taught(measurement):

@@ -110,14 +110,6 @@ class FormulaPours:
         return PointPour(tuple(mean + noise(text, width)), "measured", (), surface)
 
 
-@pytest.fixture
-def measurement(monkeypatch):
-    monkeypatch.setattr(diagnosis, "ModelPours", FormulaPours)
-    found = load_measurement(measurement_folder("trefoil_1"))
-    monkeypatch.setattr(FormulaPours, "declared", declare(found, NAMES))
-    return found
-
-
 def measure(monkeypatch, effects, seed, formula=expected, held_out=None, instrument=0.0):
     """Let the laboratory read the formula with ``effects``, in the fitted and in the held-out conditions.
 
