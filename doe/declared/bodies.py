@@ -118,14 +118,15 @@ class BodyEvidence:
         Loadings: shifts by one standard deviation of what piles depend on as well, the k parameters (by a Cholesky
         factor of their covariance) and the amplitudes of the p effects, away from zero.
         """
-        moved = [(p, one) for p, one in enumerate(model.effects) if self.moved_by(one[0])]
-        still = [self.shift(name, np.array(amplitude)) for _, (name, amplitude, _) in moved]
+        shifts = [(p, *one, self._shift(one[0])) for p, one in enumerate(model.effects)]
+        moved = [(p, name, a, deviation, known) for p, name, a, deviation, known in shifts if known is not None]
+        still = [self.shift(name, np.array(amplitude)) for _, name, amplitude, _, _ in moved]
         mean = self._together(still, (len(self.rows),))
         by_effects = np.zeros((len(self.rows), len(model.effects)))
-        for k, (p, (name, amplitude, deviation)) in enumerate(moved):
-            step, known = math.copysign(deviation, amplitude), self._shift(name)
+        for k, (p, name, amplitude, deviation, known) in enumerate(moved):
+            step = math.copysign(deviation, amplitude)
             # At the end of the range the step back stands for the one beyond it.
-            sign = 1.0 if known is None or known.x[0] <= amplitude + step <= known.x[-1] else -1.0
+            sign = 1.0 if known.x[0] <= amplitude + step <= known.x[-1] else -1.0
             more = self.shift(name, np.array(amplitude + sign * step))
             by_effects[:, p] = sign * (self._together([*still[:k], more, *still[k + 1 :]], mean.shape) - mean)
         loadings = np.concatenate([self.slopes @ np.linalg.cholesky(model.unsure), by_effects], axis=1)

@@ -45,7 +45,7 @@ MISTAKEN = 0.01
 """Probability from which an answer counts among those that the given answer may be mistaken for."""
 INTERVAL = 2.0 * 1.96
 """Width of a 95 % interval [standard deviations]."""
-FINE = 1e3
+MAGNIFIED = 1e3
 """Factor by which numbers of single bodies are multiplied beside features with the noise of a pour."""
 
 
@@ -213,8 +213,8 @@ def with_bodies(one: Prediction, loadings: FloatArray, acts: ActingModel, bodies
     if bodies is not None:
         # In a unit so small that the noise of a pour, which is added to every number, is none.
         mean, noise, more = bodies.predicted(acts)
-        one = Prediction(np.append(one.mean, FINE * mean), block_diag(one.covariance, FINE**2 * noise))
-        loadings = np.concatenate([loadings, FINE * more])
+        one = Prediction(np.append(one.mean, MAGNIFIED * mean), block_diag(one.covariance, MAGNIFIED**2 * noise))
+        loadings = np.concatenate([loadings, MAGNIFIED * more])
     return Prediction(one.mean, one.covariance + loadings @ loadings.T)
 
 

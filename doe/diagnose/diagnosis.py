@@ -192,7 +192,8 @@ def _settled(
     for _ in range(budget.looks):
         found = compared.posterior
         name, p = found.best if found.effects else ("", 0.0)
-        named, seen = set(name.split("+")), set(name.split("+")) <= looked
+        named = set(name.split("+"))
+        seen = named <= looked
         quiet = NOTHING_FROM if seen else QUIET
         held = (held if name == before else 0) + 1 if p >= THRESHOLD and seen else 0
         before = name
@@ -298,7 +299,9 @@ def offered(condition: Condition, c: int, compared: Compared) -> Offered:
 
 def errors_of(conditions: Sequence[Condition], role: str, found: Conclusion) -> tuple[HoldoutError, ...]:
     """Errors over the conditions of ``role``, except those without a measured replicate or two pours of each model."""
-    of_role = [(condition, c) for c, condition in enumerate(conditions) if condition.role == role]
-    every = [(replicates_of(one), found.before.blocks[c], found.after.blocks[c]) for one, c in of_role]
-    compared = [HoldoutCondition(*one) for one in every if len(one[0].values) and min(map(len, one[1:])) >= 2]
+    compared = []
+    for c, condition in enumerate(conditions):
+        measured, poured = replicates_of(condition), (found.before.blocks[c], found.after.blocks[c])
+        if condition.role == role and len(measured.values) and min(map(len, poured)) >= 2:
+            compared.append(HoldoutCondition(measured, *poured))
     return holdout_errors(compared) if compared else ()

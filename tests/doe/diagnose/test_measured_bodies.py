@@ -14,7 +14,7 @@ from doe.declared.bodies import ActingModel, BodyEvidence, body_evidence, wanted
 from doe.declared.budget import Budget
 from doe.declared.model import declare
 from doe.diagnose import diagnosis
-from doe.diagnose.candidate_experiments import FINE, acting_in, checked_by_bodies, with_bodies
+from doe.diagnose.candidate_experiments import MAGNIFIED, acting_in, checked_by_bodies, with_bodies
 from doe.diagnose.compared_features import MeasuredFeatures, weighed
 from doe.diagnose.emulator import Lessons, Way
 from doe.diagnose.next_experiment import DRAWS, CandidateExperiment, Prediction, chance_of_an_answer
@@ -147,7 +147,7 @@ def test_a_pile_and_bodies_are_predicted_together(data):
     both = np.concatenate([pile, np.linalg.solve(factor, slopes)])
     white = np.linalg.solve(factor, np.linalg.solve(factor, noise).T)
     covariance = block_diag(of_pile, white) + both @ unsure @ both.T + np.outer(more, more)
-    unit = np.array([1.0, 1.0, 1.0, FINE, FINE])
+    unit = np.array([1.0, 1.0, 1.0, MAGNIFIED, MAGNIFIED])
     told = np.linalg.solve(factor, slopes @ theta - 0.1 * by_effect)
     assert found.mean == pytest.approx(unit * np.append(np.zeros(3), told))
     assert found.covariance == pytest.approx(np.outer(unit, unit) * covariance)
@@ -159,7 +159,7 @@ def test_numbers_are_predicted_where_nothing_is_calibrated(data):
     bodies = BodyEvidence(None, (None,), np.zeros(1), np.zeros((1, 0)), np.eye(1), np.eye(1), ())
     acts = ActingModel([], np.zeros(0), np.zeros((0, 0)))
     found = with_bodies(Prediction(np.zeros(2), np.eye(2)), np.zeros((2, 0)), acts, bodies)
-    assert found.covariance == pytest.approx(np.diag([1.0, 1.0, FINE**2]))
+    assert found.covariance == pytest.approx(np.diag([1.0, 1.0, MAGNIFIED**2]))
     declared = declare(replace(data, parameters=()), tuple(EFFECTS))
     nothing = known(compared(None).posterior)
     still = {
