@@ -113,7 +113,7 @@ def run_diagnosis(
     model, everywhere = pours_in(measurement.fit), pours_in(measurement.conditions)
     training = TrainingPours(declared, measurement.fit, model, budget, say)
     compared = pursued(training, measurement, budget, say, follow_up)
-    verdict = verdict_of(compared, declared, training.pours, follow_up is not None)
+    verdict = verdict_of(compared, declared, training.pours, follow_up)
     say(f"verdict: {verdict.kind}")
     confirmed, verdict = concluded(verdict, compared, declared, measurement.conditions, everywhere, say)
     candidates = CandidateExperiments((), 0)
@@ -194,10 +194,9 @@ def _settled(
         name, p = found.best if found.effects else ("", 0.0)
         named = set(name.split("+"))
         seen = named <= looked
-        quiet = NOTHING_FROM if seen else QUIET
         held = (held if name == before else 0) + 1 if p >= THRESHOLD and seen else 0
         before = name
-        settled = found.nothing >= quiet or (held > 0 and p >= SETTLED) or held >= HELD
+        settled = found.nothing >= (NOTHING_FROM if seen else QUIET) or (held > 0 and p >= SETTLED) or held >= HELD
         if not any(training.ways[way].effect in named for way, _ in training.at_end(found)):
             if settled:
                 break

@@ -6,7 +6,7 @@ all answers that are still possible, which may include ``no_missing_effect`` and
     something is named     if it is the most probable effect or pair, its probability is at least ``THRESHOLD``
                            (after a follow-up, which cannot tell what acts with it: alone or with others), the data
                            are likely under it (``FITS``), and the declared model is in doubt (``DOUBTED``); two
-                           effects after a follow-up only, for in one set-up their sum may look like other effects
+                           effects after a follow-up with pours only: in one set-up their sum may look like others
     no_missing_effect      if its probability is at least ``NOTHING_AT_ONCE``, or ``NOTHING_FROM`` after a follow-up
     unexplained            if something outside the library is the most probable, or no remaining model fits
     ambiguous              otherwise: the smallest set that holds ``CREDIBLE``
@@ -25,6 +25,7 @@ from doe.declared.model import CalibratedParameter, Declared
 from doe.diagnose.compared_features import Compared
 from doe.diagnose.posterior import FITS, TEMPERATURE, Fit, Posterior
 from doe.diagnose.result import NO_EFFECT, UNEXPLAINED, EffectRow, ParameterRow, Place, Residual
+from doe.measurement.measurement import Measurement
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
@@ -93,14 +94,16 @@ class Verdict(Record):
     taken_back: str = ""
 
 
-def answer(found: Posterior, followed_up: bool) -> tuple[str, tuple[str, ...], str]:
-    """Kind, names and statement for a posterior."""
+def answer(found: Posterior, followed_up: bool, by_bodies: bool = False) -> tuple[str, tuple[str, ...], str]:
+    """Kind, names and statement for a posterior. ``by_bodies``: whether the follow-up was of single bodies alone."""
     name, sure = candidate(found, followed_up)
     p, doubted = found.effects.get(name, 0.0), in_doubt(found, sure)
     if doubted and sure >= THRESHOLD and found.fits[name].p >= FITS:
-        if "+" in name and not followed_up:
+        if "+" in name and (by_bodies or not followed_up):
             names = tuple(sorted(found.effects, key=lambda one: -found.effects[one])[:2])
-            text = f"{_spoken(name)} would explain the data ({_percent(p)}); another set-up has to show the same."
+            text = (
+                f"{_spoken(name)} would explain the data ({_percent(p)}); pours of a follow-up have to show the same."
+            )
             return f"ambiguous:{','.join(names)}", names, text
         kind = f"effects:{name}" if "+" in name else f"effect:{name}"
         beside = "" if p >= THRESHOLD else f", alone ({_percent(p)}) or with another effect"
@@ -173,10 +176,10 @@ def listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
 
 
-def verdict_of(compared: Compared, declared: Declared, pours: Sequence[int], followed_up: bool) -> Verdict:
-    """The verdict with its tables. ``pours``: that trained each way; ``followed_up``: whether no more can be asked."""
+def verdict_of(compared: Compared, declared: Declared, pours: Sequence[int], follow_up: Measurement | None) -> Verdict:
+    """The verdict with its tables. ``pours``: that trained each way; ``follow_up``: the data of one, or None."""
     found = compared.posterior
-    kind, names, statement = answer(found, followed_up)
+    kind, names, statement = answer(found, follow_up is not None, follow_up is not None and not follow_up.conditions)
     final = names[0] if names else "base"
     before, after = found.fits["base"], found.fits[final]
     white = _recalibrated(compared)
@@ -248,12 +251,11 @@ def _cosine(one: FloatArray, other: FloatArray) -> float:
     return float(one @ other) / size if size > 0.0 else 0.0
 
 
-def _parameter_row(parameter: CalibratedParameter, j: int, before: Fit, after: Fit) -> ParameterRow:
+def _parameter_row(one: CalibratedParameter, j: int, before: Fit, after: Fit) -> ParameterRow:
     def of(fit: Fit) -> tuple[float, float]:
-        return parameter.natural(float(fit.theta[j])), parameter.deviation * float(np.sqrt(fit.theta_covariance[j, j]))
+        return one.natural(float(fit.theta[j])), one.deviation * float(np.sqrt(fit.theta_covariance[j, j]))
 
-    mean, sd = parameter.mean, parameter.sd
-    return ParameterRow(parameter.name, parameter.low, parameter.high, mean, sd, *of(before), *of(after))
+    return ParameterRow(one.name, one.low, one.high, one.mean, one.sd, *of(before), *of(after))
 
 
 def _residuals(compared: Compared, before: Fit, after: Fit) -> tuple[Residual, ...]:

@@ -218,7 +218,7 @@ class Answers:
         fitted, held = self.model_pours(measurement.fit), self.model_pours(measurement.holdout)
         training = TrainingPours(declared, measurement.fit, fitted, self.budget, say)
         compared = pursued(training, measurement, self.budget, say, follow_up)
-        verdict = verdict_of(compared, declared, training.pours, follow_up is not None)
+        verdict = verdict_of(compared, declared, training.pours, follow_up)
         conclusion, verdict = concluded(verdict, compared, declared, measurement.holdout, held, say)
         found = compared.posterior
         suggestion = None

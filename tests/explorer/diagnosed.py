@@ -238,8 +238,8 @@ def diagnosed(
     lessons = lessons_of(world, declared, levels, draw)
     compared = weighed(lessons, ways, offers)
     taught = [int((lessons.way == w).sum()) for w in range(len(ways))]
-    # Two effects are named by a follow-up only.
-    verdict = verdict_of(compared, declared, taught, followed_up=len(effects) > 1)
+    # Two effects are named after a follow-up only.
+    verdict = verdict_of(compared, declared, taught, measurement if len(effects) > 1 else None)
     fresh = FormulaPours(world, declared, ways, conditions, draw)
     found, verdict = concluded(verdict, compared, declared, conditions, fresh, lambda line: None)
     return measurement, Diagnosis(

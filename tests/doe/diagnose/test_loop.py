@@ -190,10 +190,12 @@ def test_two_effects_at_once_ask_for_another_set_up_before_they_are_named(measur
     assert first.rivals[0] == both
     # Both answers count alike, though one is all but certain.
     assert first.experiment.chance > 0.9
-    before = replace(measurement, conditions=measurement.fit[:0])
-    measure(monkeypatch, planted, 1)
-    again = diagnosis.run_diagnosis(measurement, None, None, NAMES, BUDGET, said.append, follow_up=before)
-    assert again.verdict.kind == f"effects:{both}", said
+    other_set_up = replace(measurement.fit[0], name="another set-up")
+    for poured, kind in [((), f"ambiguous:{both},"), ((other_set_up,), f"effects:{both}")]:
+        measure(monkeypatch, planted, 1)
+        follow_up = replace(measurement, conditions=poured)
+        again = diagnosis.run_diagnosis(measurement, None, None, NAMES, BUDGET, said.append, follow_up=follow_up)
+        assert again.verdict.kind.startswith(kind), said
 
 
 def not_adding(theta, effects, condition, width):
@@ -534,7 +536,7 @@ def test_without_held_out_conditions_nothing_is_confirmed_or_taken_back(measurem
     declared = declare(measurement, NAMES[:1])
     training = TrainingPours(declared, measurement.fit, FormulaPours(measurement.fit, (), None, None), BUDGET, print)
     compared = diagnosis.pursued(training, measurement, BUDGET, print, None)
-    verdict = diagnosis.verdict_of(compared, declared, training.pours, False)
+    verdict = diagnosis.verdict_of(compared, declared, training.pours, None)
     conclusion, after = diagnosis.concluded(verdict, compared, declared, (), FormulaPours((), (), None, None), print)
     assert after == verdict
     assert conclusion.held_out is None

@@ -65,12 +65,13 @@ def test_after_a_follow_up_what_is_in_all_answers_is_named(found, kind, at_once)
 
 
 @pytest.mark.parametrize("effects", [{"a+b": 0.97, "a+c": 0.01, "b": 0.005}, {"a+b": 0.97, "b": 0.005, "a+c": 0.001}])
-def test_two_effects_are_named_where_another_set_up_has_shown_the_same(effects):
+def test_two_effects_are_named_where_pours_of_a_follow_up_have_shown_the_same(effects):
     """At once their sum may come nearest to two others (root 6, set 6): the next most probable answer is left too."""
     found, (pair, next_one, _) = posterior(0.005, 0.005, effects), effects
     kind, names, text = answer(found, followed_up=False)
     assert (kind, names) == (f"ambiguous:{pair},{next_one}", (pair, next_one))
-    assert text == "a with b would explain the data (97 %); another set-up has to show the same."
+    assert text == "a with b would explain the data (97 %); pours of a follow-up have to show the same."
+    assert answer(found, followed_up=True, by_bodies=True) == (kind, names, text)
     assert answer(found, followed_up=True)[:2] == ("effects:a+b", ("a+b",))
     badly = posterior(0.005, 0.005, effects, ["a+b"])
     assert answer(badly, followed_up=False)[0] == answer(badly, followed_up=True)[0] == UNEXPLAINED
@@ -171,7 +172,7 @@ def test_the_tables_of_a_verdict_by_closed_form():
     compared = weighed(taught, (Way("push", "push"),), [data])
     parameter = CalibratedParameter("friction", 0.0, 1.0, 0.3, 0.05)
     declared = Declared((parameter,), (), (DeclaredCondition("low", names),))
-    found = verdict_of(compared, declared, (200,), followed_up=False)
+    found = verdict_of(compared, declared, (200,), None)
 
     # Far features are drawn in, 2 asinh(x/2); the mean of six has a variance of r/6, and θ ~ N(0, 1) beforehand.
     noise = compared.data.scatter / 6.0
@@ -212,9 +213,9 @@ def test_strengths_know_what_bodies_say_of_the_parameters():
             factor = np.linalg.cholesky(np.eye(1) + slopes @ slopes.T)
             bodies = BodyEvidence(None, (None,), np.zeros(1), slopes, np.eye(1), factor, (), {"twisting": None})
         compared = weighed(taught, (Way("twisting", "twisting"),), [data], (), bodies)
-        (effect,) = verdict_of(compared, declared, (200,), followed_up=False).effects
+        (effect,) = verdict_of(compared, declared, (200,), None).effects
         noise = compared.data.scatter / 6.0
         assert effect.strength == pytest.approx(1.0 / np.sqrt(noise + left), rel=0.15), slope
         # Another emulator's prediction of the base model is no shift by an effect.
-        (again,) = verdict_of(compared.refitted(["base"]), declared, (200,), followed_up=False).effects
+        (again,) = verdict_of(compared.refitted(["base"]), declared, (200,), None).effects
         assert again.fitted_strength == effect.fitted_strength

@@ -63,9 +63,8 @@ class Asked:
 
         declared, budget = declare(measurement, tuple(EFFECTS)), self._answers.budget
         training = TrainingPours(declared, measurement.fit, pours_in(measurement.fit), budget, lambda line: None)
-        followed_up = is_last and self._answers.follow_up
         compared = pursued(training, measurement, budget, lambda line: None, follow_up)
-        verdict = verdict_of(compared, declared, training.pours, followed_up)
+        verdict = verdict_of(compared, declared, training.pours, follow_up)
         found = compared.posterior
         if is_last:
             return verdict, found, None
