@@ -94,16 +94,16 @@ def run_diagnosis(
     say: Say,
     on_pour: OnPour | None = None,
     seed: int = 0,
-    follow_up: Measurement | None = None,
+    follow_ups: Sequence[Measurement] = (),
     plan_next: bool = True,
 ) -> Diagnosis:
     """Diagnose ``measurement`` against its declared model, with ``effects`` as candidates.
 
-    Data sets of one model share their pours; another ``seed`` gives other pours. The conditions of a ``follow_up`` are
-    fitted as well. ``plan_next``: whether to look for what could be measured next.
+    Data sets of one model share their pours; another ``seed`` gives other pours. ``follow_ups`` are fitted as well, in
+    the order in which they were asked for. ``plan_next``: whether to look for what could be measured next.
     """
     declared, paths = declare(measurement, effects), [p.path for p in measurement.parameters]
-    if follow_up is not None:
+    for follow_up in follow_ups:
         measurement = joined(measurement, follow_up)
     root = ROOT if seed == 0 else FIRST_OTHER_ROOT + seed
 
@@ -112,12 +112,12 @@ def run_diagnosis(
 
     model, everywhere = pours_in(measurement.fit), pours_in(measurement.conditions)
     training = TrainingPours(declared, measurement.fit, model, budget, say)
-    compared = pursued(training, measurement, budget, say, follow_up)
-    verdict = verdict_of(compared, declared, training.pours, follow_up)
+    compared = pursued(training, measurement, budget, say, follow_ups)
+    verdict = verdict_of(compared, declared, training.pours, follow_ups)
     say(f"verdict: {verdict.kind}")
     confirmed, verdict = concluded(verdict, compared, declared, measurement.conditions, everywhere, say)
     candidates = CandidateExperiments((), 0)
-    if follow_up is None and plan_next:
+    if plan_next:
         say("looking for what single bodies would tell, and what to measure next")
         candidates = suggested(verdict, compared.posterior, training, measurement, pours_in)
     return Diagnosis(
@@ -159,21 +159,22 @@ def joined(measurement: Measurement, follow_up: Measurement) -> Measurement:
 
 
 def pursued(
-    training: TrainingPours, measurement: Measurement, budget: Budget, say: Say, follow_up: Measurement | None
+    training: TrainingPours, measurement: Measurement, budget: Budget, say: Say, follow_ups: Sequence[Measurement]
 ) -> Compared:
-    """Models and data after closer looks at what is in question; ``measurement`` already contains ``follow_up``."""
+    """Models and data after closer looks at what is in question; ``measurement`` already contains ``follow_ups``."""
     data = [measured(condition) for condition in measurement.fit]
     instruments, looked = training.instruments(data), set[str]()
     parts = [(len(data), measurement)]
-    if follow_up is not None:
+    for one in reversed(follow_ups):
         # Data that settle the question need no look, but the looks before a follow-up are made in its set-up too.
-        known = replace(measurement, bodies=measurement.bodies[: len(measurement.bodies) - len(follow_up.bodies)])
-        parts.insert(0, (len(data) - len(follow_up.fit), known))
+        number, known = parts[0]
+        bodies = known.bodies[: len(known.bodies) - len(one.bodies)]
+        parts.insert(0, (number - len(one.fit), replace(known, bodies=bodies)))
     for number, part in parts:
         by_bodies = partial(weighed, ways=training.ways, bodies=body_evidence(part, training.declared))
         weigh = partial(by_bodies, conditions=data[:number], instruments=instruments[:number])
         compared = _settled(training, weigh, budget, say, looked)
-        label, sure = candidate(compared.posterior, follow_up is not None)
+        label, sure = candidate(compared.posterior, bool(follow_ups))
         if sure >= THRESHOLD:
             training.refine(compared.posterior, label)
             compared = weigh(training.lessons())
@@ -203,8 +204,7 @@ def _settled(
             if seen and (rival := inseparable(compared, name)):
                 say(f"no pours can tell {name} from {rival}: they differ by less than the noise of the data")
                 break
-        poured = training.look(found)
-        if not poured:
+        if not (poured := training.look(found)):
             break
         looked |= set(poured)
         compared = weigh(training.lessons())

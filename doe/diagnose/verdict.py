@@ -95,7 +95,7 @@ class Verdict(Record):
 
 
 def answer(found: Posterior, followed_up: bool, by_bodies: bool = False) -> tuple[str, tuple[str, ...], str]:
-    """Kind, names and statement for a posterior. ``by_bodies``: whether the follow-up was of single bodies alone."""
+    """Kind, names and statement for a posterior. ``by_bodies``: whether follow-ups were of single bodies alone."""
     name, sure = candidate(found, followed_up)
     p, doubted = found.effects.get(name, 0.0), in_doubt(found, sure)
     if doubted and sure >= THRESHOLD and found.fits[name].p >= FITS:
@@ -176,10 +176,10 @@ def listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
 
 
-def verdict_of(compared: Compared, declared: Declared, pours: Sequence[int], follow_up: Measurement | None) -> Verdict:
-    """The verdict with its tables. ``pours``: that trained each way; ``follow_up``: the data of one, or None."""
+def verdict_of(compared: Compared, declared: Declared, pours: Sequence[int], asked: Sequence[Measurement]) -> Verdict:
+    """The verdict with its tables. ``pours``: that trained each way; ``asked``: the follow-ups among the data."""
     found = compared.posterior
-    kind, names, statement = answer(found, follow_up is not None, follow_up is not None and not follow_up.conditions)
+    kind, names, statement = answer(found, bool(asked), not any(one.fit for one in asked))
     final = names[0] if names else "base"
     before, after = found.fits["base"], found.fits[final]
     white = _recalibrated(compared)

@@ -195,7 +195,7 @@ class Answers:
             found = self.followed_up(truth, first.suggestion, scanner)
             if found is None:
                 return first.row
-            last = self.judged_data(measurement, truth, offer, found)
+            last = self.judged_data(measurement, truth, offer, (found,))
         return replace(
             last.row,
             first=first.row.verdict,
@@ -206,23 +206,23 @@ class Answers:
         )
 
     def judged_data(
-        self, measurement: Measurement, truth: Truth, offer: str, follow_up: Measurement | None = None
+        self, measurement: Measurement, truth: Truth, offer: str, follow_ups: Sequence[Measurement] = ()
     ) -> Judged:
         """The row of a data set, and what to measure next.
 
         The diagnosis does not see ``truth``, which only fills and scores the row.
         """
         declared, say = self.strengths.declared, _silent
-        if follow_up is not None:
+        for follow_up in follow_ups:
             measurement = joined(measurement, follow_up)
         fitted, held = self.model_pours(measurement.fit), self.model_pours(measurement.holdout)
         training = TrainingPours(declared, measurement.fit, fitted, self.budget, say)
-        compared = pursued(training, measurement, self.budget, say, follow_up)
-        verdict = verdict_of(compared, declared, training.pours, follow_up)
+        compared = pursued(training, measurement, self.budget, say, follow_ups)
+        verdict = verdict_of(compared, declared, training.pours, follow_ups)
         conclusion, verdict = concluded(verdict, compared, declared, measurement.holdout, held, say)
         found = compared.posterior
         suggestion = None
-        if self.follow_up and follow_up is None:
+        if self.follow_up and not follow_ups:
             candidates = suggested(verdict, found, training, measurement, self.model_pours)
             suggestion = next(iter(candidates.suggestions), None)
         best, best_p = found.best

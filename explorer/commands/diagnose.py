@@ -28,7 +28,10 @@ def diagnose(
     scheduler: str = SCHEDULER,
     seed: int = typer.Option(0, min=0, help="Seed of the pours; another seed gives other pours."),
     follow_up: Path | None = typer.Option(
-        None, "--follow-up", metavar="DIR", help="Completed folder OUT/next of a diagnosis."
+        None,
+        "--follow-up",
+        metavar="DIR",
+        help="Completed folder OUT/next of a diagnosis; those before it are included.",
     ),
     given: Path | None = typer.Option(
         None,

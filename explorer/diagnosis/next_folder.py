@@ -69,11 +69,15 @@ DIMENSIONS = {
 
 @dataclass(frozen=True, eq=False)
 class NextFolder:
-    """A follow-up that was measured: the labels it is to tell apart, the name of the change, and its data."""
+    """A follow-up that was measured: the labels it is to tell apart, the name of the change, and its data.
+
+    before: folders of the follow-ups that were among the data when it was asked for, the first one first.
+    """
 
     rivals: tuple[str, ...]
     change: str
     measurement: Measurement
+    before: tuple[Path, ...]
 
 
 def write_next(
@@ -83,11 +87,12 @@ def write_next(
     suggestion: Suggestion,
     given: Path | None = None,
     taken: Sequence[str] = (),
+    before: Sequence[Path] = (),
 ) -> None:
     """Write ``suggestion``, a change of a condition of ``measurement`` as read from ``source``, to the new ``folder``.
 
     ``given``: finished diagnosis that the command for the follow-up also has to name. ``taken``: names of further
-    conditions, from earlier follow-ups.
+    conditions, from earlier follow-ups. ``before``: folders of those that were among the data.
 
     Raises CommandError in one line if the folder is not empty or no condition can state the change.
     """
@@ -107,7 +112,7 @@ def write_next(
         write_whole(made / "README.md", readme)
         order = {"schema": SCHEMA, "rivals": suggestion.rivals, "change": suggestion.experiment.name}
         order |= {"values": suggestion.values, "turned": suggestion.turned, "condition": suggestion.condition}
-        order |= {"source": str(source.absolute())}
+        order |= {"source": str(source.absolute()), "before": [str(one.absolute()) for one in before]}
         write_whole(made / ORDER, json.dumps(plain(order), ensure_ascii=False, indent=1) + "\n")
 
 
@@ -151,7 +156,7 @@ def _write_pours(
 def asks_for(folder: Path, suggestion: Suggestion) -> bool:
     """Whether the follow-up in ``folder`` is ``suggestion``, for the same answers."""
     try:
-        return _order(folder) == (tuple(suggestion.rivals), suggestion.experiment.name)
+        return _order(folder)[:2] == (tuple(suggestion.rivals), suggestion.experiment.name)
     except CommandError:  # somebody has changed the file
         return False
 
@@ -162,7 +167,7 @@ def read_next(folder: Path) -> NextFolder:
     Raises CommandError if it is not such a folder or holds no value yet, MeasurementError if the data cannot be read;
     each in one line naming file and key.
     """
-    rivals, change = _order(folder)
+    rivals, change, before = _order(folder)
     try:
         measurement = load_measurement(folder, follow_up=True)
         if not measurement.conditions and not measurement.bodies:
@@ -170,7 +175,7 @@ def read_next(folder: Path) -> NextFolder:
                 f"{folder / BODIES}: mean: none is filled in yet; remove the # from a row and enter mean and standard "
                 "error"
             )
-        return NextFolder(rivals, change, measurement)
+        return NextFolder(rivals, change, measurement, before)
     except MeasurementError:
         for table in sorted(folder.glob("*.csv")):
             if table.name != BODIES and not _holds_value(table):
@@ -180,8 +185,14 @@ def read_next(folder: Path) -> NextFolder:
         raise
 
 
-def _order(folder: Path) -> tuple[tuple[str, ...], str]:
-    """Rivals and change of the follow-up in ``folder``; raises CommandError if its file is not valid."""
+def measured_so_far(folder: Path) -> tuple[Measurement, ...]:
+    """The follow-up in ``folder`` after those before it, each read by :func:`read_next`."""
+    last = read_next(folder)
+    return (*(read_next(one).measurement for one in last.before), last.measurement)
+
+
+def _order(folder: Path) -> tuple[tuple[str, ...], str, tuple[Path, ...]]:
+    """Rivals, change and predecessors of the follow-up in ``folder``; raises CommandError if its file is not valid."""
     path = folder / ORDER
     try:
         order = json.loads(read_text(path, MOST_BYTES, CommandError))
@@ -190,14 +201,16 @@ def _order(folder: Path) -> tuple[tuple[str, ...], str]:
     if not isinstance(order, dict) or order.get("schema") != SCHEMA:
         found = order.get("schema") if isinstance(order, dict) else order
         raise CommandError(f"{path}: schema: {found!r:.60}; allowed: {SCHEMA}")
-    rivals, change = order.get("rivals"), order.get("change")
+    rivals, change, before = order.get("rivals"), order.get("change"), order.get("before", [])
     if not isinstance(rivals, list) or len(rivals) < 2 or not all(_is_label(label) for label in rivals):
         raise CommandError(
             f"{path}: rivals: {rivals!r:.60}; allowed: a list of {BASE}, effects or pairs a+b, two or more"
         )
     if not isinstance(change, str):
         raise CommandError(f"{path}: change: {change!r:.60}; allowed: the name of a change")
-    return tuple(rivals), change
+    if not isinstance(before, list) or not all(isinstance(one, str) for one in before):
+        raise CommandError(f"{path}: before: {before!r:.60}; allowed: a list of folders of earlier follow-ups")
+    return tuple(rivals), change, tuple(map(Path, before))
 
 
 def _is_label(label: Any) -> bool:

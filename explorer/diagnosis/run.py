@@ -31,7 +31,7 @@ from explorer.background.output_folder import kept_for_one, read_result
 from explorer.background.progress import PourProgress
 from explorer.background.reporter import Reporter
 from explorer.diagnosis.corrected import corrected_toml, study_toml
-from explorer.diagnosis.next_folder import NEXT, ORDER, asks_for, read_next, write_next
+from explorer.diagnosis.next_folder import NEXT, ORDER, asks_for, measured_so_far, read_next, write_next
 from explorer.diagnosis.result import (
     CORRECTED,
     CORRECTED_STUDY,
@@ -112,21 +112,27 @@ class Earlier:
     follow_ups: tuple[Measurement, ...] = ()
 
     def carried_into(
-        self, measurement: Measurement, follow_up: Measurement | None
-    ) -> tuple[Measurement, Measurement | None]:
+        self, measurement: Measurement, follow_ups: Sequence[Measurement]
+    ) -> tuple[Measurement, tuple[Measurement, ...]]:
         """``measurement`` with the earlier follow-ups among its fitted conditions, and the effects in its model.
 
-        A new ``follow_up`` also has the effects in its model, within the same ranges: those that both rigs allow.
+        New ``follow_ups`` also have the effects in their models, within the same ranges: those that all rigs allow.
         """
         for one in self.follow_ups:
             measurement = joined(measurement, one)
-        if follow_up is None or not self.given:
-            return with_given(measurement, self.given), follow_up
-        both = with_given(joined(measurement, follow_up), self.given)
-        known = {one.name for one in measurement.conditions}
-        old = tuple(one for one in both.conditions if one.name in known)
-        new = tuple(one for one in both.conditions if one.name not in known)
-        return replace(both, conditions=old), replace(follow_up, parameters=both.parameters, conditions=new)
+        if not self.given:
+            return measurement, tuple(follow_ups)
+        everything = measurement
+        for one in follow_ups:
+            everything = joined(everything, one)
+        everything = with_given(everything, self.given)
+        made = {one.name: one for one in everything.conditions}
+
+        def own(part: Measurement) -> Measurement:
+            conditions = tuple(made[one.name] for one in part.conditions if one.name in made)
+            return replace(everything, folder=part.folder, conditions=conditions, bodies=part.bodies)
+
+        return own(measurement), tuple(own(one) for one in follow_ups)
 
 
 NOTHING_BEFORE = Earlier({})
@@ -150,7 +156,7 @@ def run_diagnose(order: DiagnoseOrder, reporter: Reporter) -> DiagnosisResult:
         raise CommandError(f"--effects: {unknown[0]!r} is not one of {', '.join(EFFECTS)}")
     measurement = load_measurement(order.folder)
     check_vacant(order.out, resume=order.resume)
-    asked = read_next(order.follow_up) if order.follow_up else None
+    follow_ups = measured_so_far(order.follow_up) if order.follow_up else ()
     earlier = NOTHING_BEFORE
     if order.given is not None:
         if order.given.resolve() == order.out.resolve():
@@ -161,13 +167,13 @@ def run_diagnose(order: DiagnoseOrder, reporter: Reporter) -> DiagnosisResult:
     # Start the executor before writing to the folder: perhaps no scheduler answers.
     with kept_for_one(order.out), executor(order.threads, order.scheduler) as pool:
         reporter.begin(order.out, order.resume)
-        return _run(order, measurement, asked.measurement if asked else None, earlier, pool, reporter)
+        return _run(order, measurement, follow_ups, earlier, pool, reporter)
 
 
 def _run(
     order: DiagnoseOrder,
     measurement: Measurement,
-    follow_up: Measurement | None,
+    follow_ups: Sequence[Measurement],
     earlier: Earlier,
     pool: Executor,
     reporter: Reporter,
@@ -175,7 +181,7 @@ def _run(
     """Pour, judge and write into ``order.out``, which exists and is reserved for this command."""
     say, names = reporter.say, order.effects or tuple(EFFECTS)
     path, as_declared = order.store or default_store(), measurement
-    measurement, follow_up = earlier.carried_into(measurement, follow_up)
+    measurement, follow_ups = earlier.carried_into(measurement, follow_ups)
     budget = Budget()
     if order.budget is not None:
         budget = scaled_budget(order.budget, measurement, names)
@@ -201,7 +207,7 @@ def _run(
             progress.stage,
             progress.pour,
             order.seed,
-            follow_up,
+            follow_ups,
             plan_next=order.plan_next,
         )
     result = result_of(measurement, order, earlier.given, found, reporter.elapsed)
@@ -223,8 +229,10 @@ def _run(
             same = "" if asks_for(following, found.suggestions[0]) else "; it is not what this answer asks for"
             say(f"{following}: exists already and is not changed, as it may be filled in{same}")
         else:
-            joined_names = [condition.name for condition in found.conditions]
-            write_next(following, order.folder, as_declared, found.suggestions[0], order.given, joined_names)
+            names_taken = [condition.name for part in (measurement, *follow_ups) for condition in part.conditions]
+            before = (*read_next(order.follow_up).before, order.follow_up) if order.follow_up else ()
+            asked = found.suggestions[0]
+            write_next(following, order.folder, as_declared, asked, order.given, names_taken, before)
             what = "what to measure next" if found.suggestions[0].pours else "what of single bodies checks this answer"
             say(f"{following}: {what}, to be filled in; then --follow-up {following}")
     if order.apply:
@@ -282,7 +290,7 @@ def earlier_answer(folder: Path, data: Path) -> Earlier:
         if result.order.follow_up:
             if Path(result.data.folder).resolve() != data.resolve():
                 raise CommandError(f"--given {folder}: has a follow-up of {result.data.folder}; allowed: of {data}")
-            follow_ups.insert(0, read_next(Path(result.order.follow_up)).measurement)
+            follow_ups[:0] = measured_so_far(Path(result.order.follow_up))
         if not result.order.given:
             return Earlier(given, tuple(follow_ups))
         before = Path(result.order.given).resolve()

@@ -127,7 +127,7 @@ def diagnose(
     seed
         Of the pours.
     follow_up
-        The folder ``next`` that an answer left in its ``out``, filled in.
+        The folder ``next`` that an answer left in its ``out``, filled in; taken with the follow-ups before it.
     given
         The ``out`` of a finished diagnosis: with its effect in the model, what else is missing?
     plan_next

@@ -239,7 +239,7 @@ def diagnosed(
     compared = weighed(lessons, ways, offers)
     taught = [int((lessons.way == w).sum()) for w in range(len(ways))]
     # Two effects are named after a follow-up only.
-    verdict = verdict_of(compared, declared, taught, measurement if len(effects) > 1 else None)
+    verdict = verdict_of(compared, declared, taught, [measurement] if len(effects) > 1 else [])
     fresh = FormulaPours(world, declared, ways, conditions, draw)
     found, verdict = concluded(verdict, compared, declared, conditions, fresh, lambda line: None)
     return measurement, Diagnosis(

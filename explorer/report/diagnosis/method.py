@@ -167,7 +167,7 @@ def how_reached(result: DiagnosisResult) -> Section:
             "answer back where fitted and held-out data together (Fisher; the farthest held-out summary, corrected for "
             f"their number) are as far off it as in less than {percent(result.rule.contradicted)} of cases."
         )
-    pairs = "" if result.rule.pairs_at_once else ", a pair by a follow-up only,"
+    pairs = "" if result.rule.pairs_at_once else ", a pair by pours of a follow-up only,"
     features = sum(row.features for row in result.offered)
     lines = (
         f"The same {features} features are read from measured and simulated piles. Their far tails are drawn in, and "

@@ -191,11 +191,13 @@ def test_two_effects_at_once_ask_for_another_set_up_before_they_are_named(measur
     # Both answers count alike, though one is all but certain.
     assert first.experiment.chance > 0.9
     other_set_up = replace(measurement.fit[0], name="another set-up")
-    for poured, kind in [((), f"ambiguous:{both},"), ((other_set_up,), f"effects:{both}")]:
+    poured, by_bodies = (replace(measurement, conditions=conditions) for conditions in ((other_set_up,), ()))
+    for follow_ups, kind in [([by_bodies], f"ambiguous:{both},"), ([poured, by_bodies], f"effects:{both}")]:
         measure(monkeypatch, planted, 1)
-        follow_up = replace(measurement, conditions=poured)
-        again = diagnosis.run_diagnosis(measurement, None, None, NAMES, BUDGET, said.append, follow_up=follow_up)
+        again = diagnosis.run_diagnosis(measurement, None, None, NAMES, BUDGET, said.append, follow_ups=follow_ups)
         assert again.verdict.kind.startswith(kind), said
+        # What is left open asks for another set-up again.
+        assert any(one.pours for one in again.suggestions) == again.verdict.kind.startswith("ambiguous")
 
 
 def not_adding(theta, effects, condition, width):
@@ -536,7 +538,7 @@ def test_without_held_out_conditions_nothing_is_confirmed_or_taken_back(measurem
     declared = declare(measurement, NAMES[:1])
     training = TrainingPours(declared, measurement.fit, FormulaPours(measurement.fit, (), None, None), BUDGET, print)
     compared = diagnosis.pursued(training, measurement, BUDGET, print, None)
-    verdict = diagnosis.verdict_of(compared, declared, training.pours, None)
+    verdict = diagnosis.verdict_of(compared, declared, training.pours, ())
     conclusion, after = diagnosis.concluded(verdict, compared, declared, (), FormulaPours((), (), None, None), print)
     assert after == verdict
     assert conclusion.held_out is None

@@ -274,7 +274,7 @@ def test_a_follow_up_begins_with_what_taught_the_answers_before_it(data, monkeyp
     rows = (MeasuredBody("bead", "mass", MASS, 0.01 * MASS),)
     follow_up = replace(data, conditions=data.fit if poured else (), bodies=rows)
     both = replace(data, conditions=(*data.fit, *follow_up.fit), bodies=rows)
-    assert diagnosis.pursued(training, both, Budget(), print, follow_up).bodies == rows
+    assert diagnosis.pursued(training, both, Budget(), print, [follow_up]).bodies == rows
     assert training.looks == 2
     assert weighed_with[0] == (len(data.fit), None)
     assert weighed_with[-1] == (len(both.fit), rows)

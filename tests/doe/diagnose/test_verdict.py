@@ -172,7 +172,7 @@ def test_the_tables_of_a_verdict_by_closed_form():
     compared = weighed(taught, (Way("push", "push"),), [data])
     parameter = CalibratedParameter("friction", 0.0, 1.0, 0.3, 0.05)
     declared = Declared((parameter,), (), (DeclaredCondition("low", names),))
-    found = verdict_of(compared, declared, (200,), None)
+    found = verdict_of(compared, declared, (200,), ())
 
     # Far features are drawn in, 2 asinh(x/2); the mean of six has a variance of r/6, and θ ~ N(0, 1) beforehand.
     noise = compared.data.scatter / 6.0
@@ -213,9 +213,9 @@ def test_strengths_know_what_bodies_say_of_the_parameters():
             factor = np.linalg.cholesky(np.eye(1) + slopes @ slopes.T)
             bodies = BodyEvidence(None, (None,), np.zeros(1), slopes, np.eye(1), factor, (), {"twisting": None})
         compared = weighed(taught, (Way("twisting", "twisting"),), [data], (), bodies)
-        (effect,) = verdict_of(compared, declared, (200,), None).effects
+        (effect,) = verdict_of(compared, declared, (200,), ()).effects
         noise = compared.data.scatter / 6.0
         assert effect.strength == pytest.approx(1.0 / np.sqrt(noise + left), rel=0.15), slope
         # Another emulator's prediction of the base model is no shift by an effect.
-        (again,) = verdict_of(compared.refitted(["base"]), declared, (200,), None).effects
+        (again,) = verdict_of(compared.refitted(["base"]), declared, (200,), ()).effects
         assert again.fitted_strength == effect.fitted_strength

@@ -53,8 +53,8 @@ class Asked:
             self._answers.laboratory.hand_out(Path(folder), data, self._scanner, self._seed)
             return load_measurement(Path(folder))
 
-    def judged(self, measurement, given, is_last=False, follow_up=None):
-        """Verdict and posterior with ``given`` in the model, and what to measure next; ``follow_up``: in the data."""
+    def judged(self, measurement, given, is_last=False, follow_ups=()):
+        """Verdict and posterior with ``given`` in the model, and what to measure next; ``follow_ups``: in the data."""
         measurement = with_given(measurement, given)
         place, paths = self._answers.place, [one.path for one in measurement.parameters]
 
@@ -63,8 +63,8 @@ class Asked:
 
         declared, budget = declare(measurement, tuple(EFFECTS)), self._answers.budget
         training = TrainingPours(declared, measurement.fit, pours_in(measurement.fit), budget, lambda line: None)
-        compared = pursued(training, measurement, budget, lambda line: None, follow_up)
-        verdict = verdict_of(compared, declared, training.pours, follow_up)
+        compared = pursued(training, measurement, budget, lambda line: None, follow_ups)
+        verdict = verdict_of(compared, declared, training.pours, follow_ups)
         found = compared.posterior
         if is_last:
             return verdict, found, None
@@ -82,7 +82,7 @@ class Asked:
             more = self._answers.followed_up(self.truth, next_one, self._scanner, "then" if given else "next")
             if more is not None:
                 measurement = joined(measurement, renamed(more, measurement))
-                verdict, found, _ = self.judged(measurement, given, True, more)
+                verdict, found, _ = self.judged(measurement, given, True, (more,))
         return first, verdict.kind, found, measurement
 
 

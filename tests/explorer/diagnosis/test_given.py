@@ -10,9 +10,10 @@ from doe.declared.model import effect_values, possible
 from doe.diagnose.diagnosis import joined
 from doe.diagnose.result import CalibratedModel
 from doe.measurement import load_measurement
+from doe.measurement.bodies import MeasuredBody
 from explorer import load_diagnosis
 from explorer.diagnosis import run
-from explorer.diagnosis.next_folder import write_next
+from explorer.diagnosis.next_folder import read_next, write_next
 from explorer.diagnosis.piles import model_scene
 from explorer.diagnosis.run import NOTHING_BEFORE, Earlier, earlier_answer
 from explorer.errors import CommandError
@@ -77,12 +78,12 @@ def test_what_was_measured_for_the_answer_before_is_joined(tmp_path):
     second = result_of_case("effect")
     second["order"]["given"] = str(first)
     earlier = earlier_answer(written(tmp_path / "second", second), SOURCE)
-    carried, _ = earlier.carried_into(measured, None)
+    carried, _ = earlier.carried_into(measured, ())
     assert len(carried.fit) == len(measured.fit) + 1
     ((name, amplitude),) = earlier.given.items()
     path = next(iter(effect_values(name, amplitude)))
     assert all(value(one.scene, path) > 0.0 for one in carried.conditions)
-    alone, beside = NOTHING_BEFORE.carried_into(measured, carried)
+    alone, (beside,) = NOTHING_BEFORE.carried_into(measured, [carried])
     assert alone is measured
     assert beside is carried
 
@@ -98,7 +99,7 @@ def test_the_follow_ups_of_a_chain_come_in_their_order(tmp_path):
         folder = written(tmp_path / str(number), content)
     earlier = earlier_answer(folder, SOURCE)
     assert [str(one.folder.name) for one in earlier.follow_ups] == ["next 0", "next 1", "next 2"]
-    carried, _ = earlier.carried_into(measured, None)
+    carried, _ = earlier.carried_into(measured, ())
     heights = [value(one.scene, "rig.outlet_height") for one in carried.fit[len(measured.fit) :]]
     masses = [value(one.scene, "rig.mass") for one in carried.fit[len(measured.fit) :]]
     first = measured.fit[0].scene
@@ -115,8 +116,11 @@ def test_a_follow_up_has_what_is_given_within_the_range_of_all_conditions():
     both = replace(measured, conditions=(wide, replace(wide, name="narrow", scene=narrow)))
     follow_up = replace(measured, conditions=(replace(wide, name="once more"),))
     amplitudes = {"size_dispersion": (0.1,), "density_error": (0.2,)}
-    data, more = Earlier(amplitudes).carried_into(both, follow_up)
+    bodies = (MeasuredBody("seed", "sliding_force", 0.4, 0.01),)
+    follow_up = replace(follow_up, bodies=bodies)
+    data, (more,) = Earlier(amplitudes).carried_into(both, [follow_up])
     assert [one.name for one in joined(data, more).conditions] == [wide.name, "narrow", "once more"]
+    assert joined(data, more).bodies == (*both.bodies, *bodies)
     sizes = next(one for one in more.parameters if one.path.startswith("effect.size_dispersion."))
     assert sizes.high < 0.1
     for one in joined(data, more).conditions:
@@ -232,10 +236,10 @@ def test_a_diagnosis_goes_on_from_another_one_to_its_files(tmp_path, asked):
     out, store = tmp_path / "second", ("--store", str(tmp_path / "pours.sqlite"))
     done = explorer("diagnose", str(SOURCE), "--given", str(first), "--out", str(out), *store)
     assert done.exit_code == 0, done.stderr
-    ((measurement, _, follow_up),) = asked
+    ((measurement, _, follow_ups),) = asked
     path = "effect.adhesion_sjkr.cohesion_energy_density"
     sizes = {value(one.scene, path) for one in measurement.conditions}
-    assert (len(sizes), follow_up) == (1, None)
+    assert (len(sizes), follow_ups) == (1, ())
     (size,) = sizes
     assert measurement.parameters[-1].low < size < measurement.parameters[-1].high
     result = load_diagnosis(out)
@@ -250,10 +254,34 @@ def test_a_diagnosis_goes_on_from_another_one_to_its_files(tmp_path, asked):
     words = ("--given", str(first), "--follow-up", str(tmp_path / "next"), "--out", str(last))
     done = explorer("diagnose", str(SOURCE), *words, *store)
     assert done.exit_code == 0, done.stderr
-    again, _, follow_up = asked[-1]
+    again, _, (follow_up,) = asked[-1]
     assert again.parameters == follow_up.parameters == measurement.parameters
     assert [value(one.scene, path) for one in follow_up.conditions] == [size]
     assert load_diagnosis(last).order.follow_up == str(tmp_path / "next")
+
+
+def test_an_answer_after_a_follow_up_asks_for_the_next_one(tmp_path, asked):
+    """Which is joined with the one before it, in the order in which they were asked for."""
+    store, folders = ("--store", str(tmp_path / "pours.sqlite")), []
+    for number in range(3):
+        words = ("--follow-up", str(folders[-1])) if folders else ()
+        out = tmp_path / str(number)
+        done = explorer("diagnose", str(SOURCE), "--out", str(out), *words, *store)
+        assert done.exit_code == 0, done.stderr
+        folders.append(fill(out / "next"))
+    names = [[one.name for one in follow_up.conditions] for _, _, follow_ups in asked for follow_up in follow_ups]
+    (first, second) = (file.stem for folder in folders[:2] for file in folder.glob("*.csv"))
+    assert names == [[first], [first], [second]]
+    assert first != second
+    assert read_next(folders[2]).before == tuple(folders[:2])
+    # What is missing beside that answer is asked with both as well.
+    content = result_of_case("effect")
+    content["order"]["follow_up"], content["data"]["folder"] = str(folders[1]), str(SOURCE)
+    earlier = earlier_answer(written(tmp_path / "answer", content), SOURCE)
+    assert [one.folder for one in earlier.follow_ups] == folders[:2]
+    folders[0].rename(tmp_path / "taken away")
+    gone = explorer("diagnose", str(SOURCE), "--out", str(tmp_path / "3"), "--follow-up", str(folders[1]), *store)
+    assert (gone.exit_code, f"{folders[0]}/follow_up.json: no such file" in gone.stderr) == (2, True)
 
 
 def test_a_diagnosis_gone_on_with_leaves_a_follow_up_that_is_filled_in(tmp_path, asked):

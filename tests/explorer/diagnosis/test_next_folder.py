@@ -160,6 +160,7 @@ def test_the_order_says_what_was_asked(tmp_path, measured):
         "turned": False,
         "condition": "fit",
         "source": str(SOURCE.absolute()),
+        "before": [],
     }
     assert (folder / "scans/README.txt").read_text().count("\n") == 1
 
@@ -275,6 +276,7 @@ def test_a_row_without_its_value_is_named(tmp_path, measured):
         ('{"schema": 1, "rivals": ["base", "phlogiston"], "change": "x"}', "rivals: .*phlogiston"),
         ('{"schema": 1, "rivals": ["base"], "change": "x"}', "rivals: "),
         ('{"schema": 1, "rivals": ["base", "twisting"]}', "change: None"),
+        ('{"schema": 1, "rivals": ["base", "twisting"], "change": "x", "before": "next"}', "before: 'next'; allowed: "),
     ],
 )
 def test_what_is_no_follow_up_is_refused(tmp_path, text, wanted):
