@@ -266,6 +266,12 @@ def cautions(result: DiagnosisResult) -> list[str]:
             f"Fresh pours that broke off or left nothing to be read: {before} of the declared model, "
             f"{after} of the final one. Means are those of the others."
         )
+    poured = (*result.confirmation.before.conditions, *result.confirmation.after.conditions)
+    if lost := list(dict.fromkeys(row.condition for row in poured if row.pours < 2)):
+        found.append(
+            f"Not compared with fresh pours: {enumeration(lost)}. Fewer than two pours of a model gave every number "
+            "that was measured there: it is in no error of this report, and does not test the answer."
+        )
     return found
 
 

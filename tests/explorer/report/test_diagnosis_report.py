@@ -221,7 +221,10 @@ def test_the_paragraph_for_a_paper_has_the_numbers_of_the_result(result):
 def test_the_method_states_its_rules(result):
     text = diagnosis_markdown(result).partition("## How the answer was reached")[2].partition("## ")[0]
     assert text.count("\n- ") == 6
-    assert "effect or pair, a pair by pours of a follow-up only, is named if it reaches 90 % (after a follow-up, which" in text
+    assert (
+        "effect or pair, a pair by pours of a follow-up only, is named if it reaches 90 % (after a follow-up, which"
+        in text
+    )
     assert "the data are likely under it (p ≥ 0.01), and unlikely under the declared" in text
     assert "unless the calibrated declared model fitted (p ≥ 0.1) and the name rested" in diagnosis_markdown(result)
     younger = ("doubted", "pairs_at_once")
