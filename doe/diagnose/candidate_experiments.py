@@ -26,10 +26,10 @@ from doe.declared.set_ups import changed, feasible
 from doe.diagnose.compared_features import usable
 from doe.diagnose.emulator import Emulator, Lessons, emulated, planar_weights
 from doe.diagnose.next_experiment import GIVEN_UP, CandidateExperiment, Prediction, fewest_pours, rank_experiments
-from doe.diagnose.posterior import Posterior
+from doe.diagnose.posterior import Posterior, holds
 from doe.diagnose.result import BASE, BODIES_ALONE, UNEXPLAINED, RankedExperiment, Suggestion
 from doe.diagnose.training_pours import TrainingPours, acting
-from doe.diagnose.verdict import Verdict
+from doe.diagnose.verdict import THRESHOLD, Verdict
 from doe.errors import StatisticsError
 from doe.measurement.features import feature_set, offer_of
 from doe.measurement.measurement import Condition, Measurement
@@ -114,9 +114,10 @@ def checked_by_bodies(
     """Single-body measurements that tell a given answer from those it may be mistaken for; empty if there are none."""
     if verdict.kind == UNEXPLAINED:
         return ()
-    (answer,) = verdict.names or (BASE,)
-    odds = {**found.effects, BASE: found.nothing}
-    others = [label for label, p in odds.items() if label != answer and (p >= MISTAKEN or label == BASE)]
+    (answer,), odds = verdict.names or (BASE,), {**found.effects, BASE: found.nothing}
+    # A name that may be alone or with others is not mistaken for itself with others.
+    own = {answer, *(label for label in odds if odds[answer] < THRESHOLD and holds(label, answer))}
+    others = [label for label, p in odds.items() if label not in own and (p >= MISTAKEN or label == BASE)]
     weights = {label: odds[label] for label in (answer, *sorted(others, key=lambda one: -odds[one]))}
     acts = {label: acting_in(found, label) for label in weights}
     if (bodies := wanted_bodies(measurement, declared, list(acts.values()))) is None:
@@ -126,7 +127,6 @@ def checked_by_bodies(
         label: with_bodies(nothing, np.zeros((0, len(one.theta) + len(one.effects))), one, bodies)
         for label, one in acts.items()
     }
-    # Nothing is poured: all noise is in the predictions.
     (ranked,) = rank_experiments([CandidateExperiment(BODIES_ALONE, predictions)], weights, math.inf)
     return (Suggestion(ranked, {}, measurement.fit[0].name, tuple(weights), (), 0, bodies=bodies.asked),)
 

@@ -31,7 +31,7 @@ def diagnose(
         None,
         "--follow-up",
         metavar="DIR",
-        help="Completed folder OUT/next of a diagnosis; those before it are included.",
+        help="Completed folder OUT/next of a diagnosis; the follow-ups before it are read too.",
     ),
     given: Path | None = typer.Option(
         None,

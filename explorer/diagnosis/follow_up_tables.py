@@ -19,7 +19,7 @@ from doe.measurement.load import FILE, outside_files
 from doe.measurement.long_form import COLUMNS, MOST_BYTES
 from doe.measurement.scans import SUFFIXES, scan_files
 from doe.table_file import DELIMITERS, CellTable, csv_table, read_text
-from explorer.diagnosis.next_folder import ORDER, asks_for
+from explorer.diagnosis.next_folder import ORDER, asks_for, is_copy
 from explorer.errors import CommandError
 from explorer.files.exports import zipped
 from explorer.files.measured_curves import PICTURES
@@ -184,7 +184,7 @@ def take_filled(folder: Path, suggestion: Suggestion, name: str, content: bytes,
     sent = unpacked_folder(name, content, uploads / KEPT, ORDER, read_follow_up)
     # The same archive may have been sent to another follow-up before.
     with whose(name, sent):
-        if not asks_for(sent, suggestion):
+        if not (asks_for(sent, suggestion) and is_copy(sent, folder)):
             raise CommandError(f"{ORDER}: is that of another follow-up; allowed: of {suggestion.experiment.name}")
         if (sent / FILE).read_bytes() != (folder / FILE).read_bytes():
             for key, path in outside_files(sent, read_toml(sent / FILE)):

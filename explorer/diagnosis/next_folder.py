@@ -4,13 +4,14 @@ measurement.toml, <name>.csv, scans/    a measured data set (`doe.measurement`) 
 bodies.csv                              what to measure on single bodies, if that tells the answers apart; alone,
                                         without a condition, if there is an answer that single bodies can check
 README.md, setup.svg                    what to set differently, in words and to scale
-follow_up.json                          which answers the pours are to tell apart
+follow_up.json                          which answers the pours are to tell apart, and the folders of earlier follow-ups
 """
 
 from __future__ import annotations
 
 import json
 import math
+import os
 import re
 import shlex
 import shutil
@@ -71,7 +72,7 @@ DIMENSIONS = {
 class NextFolder:
     """A follow-up that was measured: the labels it is to tell apart, the name of the change, and its data.
 
-    before: folders of the follow-ups that were among the data when it was asked for, the first one first.
+    before: folders of the follow-ups that were among the data when it was asked for, in their order.
     """
 
     rivals: tuple[str, ...]
@@ -100,7 +101,7 @@ def write_next(
         if suggestion.bodies:
             write_whole(made / BODIES, _empty_bodies(suggestion.bodies))
         if suggestion.pours:
-            readme = _write_pours(made, folder, source, measurement, suggestion, given, taken)
+            readme = _write_pours(made, source, measurement, suggestion, taken, bool(before))
         else:
             table = read_toml(source / FILE)
             stated = next(one for one in table["condition"] if one["name"] == suggestion.condition)
@@ -108,24 +109,20 @@ def write_next(
             title = f"{measurement.title or source.name}: {suggestion.experiment.name}"
             top = {"format": 1, "title": title, "material": material, "bodies": BODIES}
             write_whole(made / FILE, measurement_toml(top))
-            readme = _readme_of_bodies(folder, source, measurement, suggestion, given)
-        write_whole(made / "README.md", readme)
+            readme = _readme_of_bodies(source, measurement, suggestion)
+        write_whole(made / "README.md", f"{readme}\n{_command(folder, source, given, before)}")
         order = {"schema": SCHEMA, "rivals": suggestion.rivals, "change": suggestion.experiment.name}
         order |= {"values": suggestion.values, "turned": suggestion.turned, "condition": suggestion.condition}
-        order |= {"source": str(source.absolute()), "before": [str(one.absolute()) for one in before]}
+        # Relative, so that a project can be moved as a whole.
+        earlier = [Path(os.path.relpath(one.resolve(), folder.resolve())).as_posix() for one in before]
+        order |= {"source": str(source.absolute()), "before": earlier}
         write_whole(made / ORDER, json.dumps(plain(order), ensure_ascii=False, indent=1) + "\n")
 
 
 def _write_pours(
-    made: Path,
-    folder: Path,
-    source: Path,
-    measurement: Measurement,
-    suggestion: Suggestion,
-    given: Path | None,
-    taken: Sequence[str],
+    made: Path, source: Path, measurement: Measurement, suggestion: Suggestion, taken: Sequence[str], further: bool
 ) -> str:
-    """Write the condition to be poured into ``made``, which will become ``folder``; returns its README."""
+    """Write the condition to be poured into ``made``; returns its README. ``further``: not the first follow-up."""
     # This import loads the solver's kernels, which writing a measurement's file alone does not need.
     from doe.diagnose.candidate_experiments import as_suggested
 
@@ -150,7 +147,7 @@ def _write_pours(
         write_whole(made / "scans/README.txt", told)
     if drawing:
         write_whole(made / "setup.svg", drawing)
-    return _readme(folder, source, measurement, suggestion, name, given, bool(drawing), scanned)
+    return _readme(source, measurement, suggestion, name, further, bool(drawing), scanned)
 
 
 def asks_for(folder: Path, suggestion: Suggestion) -> bool:
@@ -175,7 +172,7 @@ def read_next(folder: Path) -> NextFolder:
                 f"{folder / BODIES}: mean: none is filled in yet; remove the # from a row and enter mean and standard "
                 "error"
             )
-        return NextFolder(rivals, change, measurement, before)
+        return NextFolder(rivals, change, measurement, tuple((folder / one).resolve() for one in before))
     except MeasurementError:
         for table in sorted(folder.glob("*.csv")):
             if table.name != BODIES and not _holds_value(table):
@@ -187,11 +184,21 @@ def read_next(folder: Path) -> NextFolder:
 
 def measured_so_far(folder: Path) -> tuple[Measurement, ...]:
     """The follow-up in ``folder`` after those before it, each read by :func:`read_next`."""
-    last = read_next(folder)
-    return (*(read_next(one).measurement for one in last.before), last.measurement)
+    last, earlier = read_next(folder), []
+    for one in last.before:
+        try:
+            earlier.append(read_next(one).measurement)
+        except (CommandError, MeasurementError) as error:
+            raise CommandError(f"{folder / ORDER}: before: {error}") from None
+    return (*earlier, last.measurement)
 
 
-def _order(folder: Path) -> tuple[tuple[str, ...], str, tuple[Path, ...]]:
+def is_copy(folder: Path, original: Path) -> bool:
+    """Whether ``folder`` is the follow-up in ``original``, filled in elsewhere."""
+    return _order(folder) == _order(original)
+
+
+def _order(folder: Path) -> tuple[tuple[str, ...], str, tuple[str, ...]]:
     """Rivals, change and predecessors of the follow-up in ``folder``; raises CommandError if its file is not valid."""
     path = folder / ORDER
     try:
@@ -210,7 +217,7 @@ def _order(folder: Path) -> tuple[tuple[str, ...], str, tuple[Path, ...]]:
         raise CommandError(f"{path}: change: {change!r:.60}; allowed: the name of a change")
     if not isinstance(before, list) or not all(isinstance(one, str) for one in before):
         raise CommandError(f"{path}: before: {before!r:.60}; allowed: a list of folders of earlier follow-ups")
-    return tuple(rivals), change, tuple(map(Path, before))
+    return tuple(rivals), change, tuple(before)
 
 
 def _is_label(label: Any) -> bool:
@@ -400,14 +407,7 @@ def _empty_bodies(asked: Sequence[tuple[str, str]]) -> str:
 
 
 def _readme(
-    folder: Path,
-    source: Path,
-    measurement: Measurement,
-    suggestion: Suggestion,
-    name: str,
-    given: Path | None,
-    drawn: bool,
-    scanned: bool,
+    source: Path, measurement: Measurement, suggestion: Suggestion, name: str, further: bool, drawn: bool, scanned: bool
 ) -> str:
     experiment, pours = suggestion.experiment, suggestion.pours
     condition = next(one for one in measurement.conditions if one.name == suggestion.condition)
@@ -423,6 +423,7 @@ def _readme(
     if any(one.origin == "photographs" for one in condition.observations):
         more += f', or name photographs under `[[condition]]` in `{FILE}`: `images = ["…"]`'
     weighed = _what_of_bodies(suggestion, "these answers differ in it") + "\n" if suggestion.bodies else ""
+    so_far = "" if further else f" {FOLLOW_UPS_SO_FAR}"
     return f"""# To be measured next: {experiment.name}
 
 The data of {title} leave {len(suggestion.rivals)} answers: {answers}. These pours are to tell them apart.
@@ -438,7 +439,7 @@ Pour **{pours} times**, each time onto the bare plate.{reading}
 {weighed}## What it will decide
 
 {pours} pours{" and these numbers" if weighed else ""} give the right answer with a chance of
-**{percent(experiment.chance)}**, by simulated pours of the likeliest of these. {FOLLOW_UPS_SO_FAR}
+**{percent(experiment.chance)}**, by simulated pours of the likeliest of these.{so_far}
 (An effect is named with {percent(THRESHOLD)} or more, alone or with others; nothing missing is the answer with
 {percent(NOTHING_FROM)} or more.)
 
@@ -452,13 +453,10 @@ Of the changes that this rig allows, none has a better chance. By their nature, 
 
 `{name}.csv`: take the `# ` off each row that you measured and write the value behind its last comma{more}.
 The table needs two pours or more. If a setting came out otherwise than asked, correct it in `{FILE}`.
+"""
 
-{_command(folder, source, given)}"""
 
-
-def _readme_of_bodies(
-    folder: Path, source: Path, measurement: Measurement, suggestion: Suggestion, given: Path | None
-) -> str:
+def _readme_of_bodies(source: Path, measurement: Measurement, suggestion: Suggestion) -> str:
     title = code(" ".join((measurement.title or source.name).split()))
     answer, *others = (spelled(label) for label in suggestion.rivals)
     return f"""# To be checked: {answer}
@@ -472,8 +470,7 @@ The data of {title} give this answer. No further pour is asked for: single bodie
 These numbers give the right answer with a chance of **{percent(suggestion.experiment.chance)}**, if it is one of these.
 They also expose a cause that is in no library: it shifts piles much as some effect does, and leaves single bodies as
 they are declared.
-
-{_command(folder, source, given)}"""
+"""
 
 
 def _what_of_bodies(suggestion: Suggestion, why: str) -> str:
@@ -487,16 +484,18 @@ scatter of lots or bodies, and what the instrument may be off), and take the `# 
 """
 
 
-def _command(folder: Path, source: Path, given: Path | None) -> str:
+def _command(folder: Path, source: Path, given: Path | None, before: Sequence[Path]) -> str:
     command = ["explorer", "diagnose", str(source.absolute()), "--follow-up", str(folder.absolute())]
     command += [] if given is None else ["--given", str(given.absolute())]
     # The folder of the first diagnosis is no longer empty.
     command += ["--out", f"{folder.absolute().parent}_with_follow_up"]
+    others = enumeration([code(str(one.absolute())) for one in before])
+    also = f"It reads {others} too, which has to stay where it is.\n\n" if others else ""
     return f"""## The command that takes it
 
     {shlex.join(command)}
 
-On the page the same is done under *Diagnose*, *Follow-up*: there the tables can be filled in, too.
+{also}On the page the same is done under *Diagnose*, *Follow-up*: there the tables can be filled in, too.
 """
 
 

@@ -31,7 +31,7 @@ from explorer.background.output_folder import kept_for_one, read_result
 from explorer.background.progress import PourProgress
 from explorer.background.reporter import Reporter
 from explorer.diagnosis.corrected import corrected_toml, study_toml
-from explorer.diagnosis.next_folder import NEXT, ORDER, asks_for, measured_so_far, read_next, write_next
+from explorer.diagnosis.next_folder import NEXT, ORDER, asks_for, measured_so_far, write_next
 from explorer.diagnosis.result import (
     CORRECTED,
     CORRECTED_STUDY,
@@ -156,6 +156,10 @@ def run_diagnose(order: DiagnoseOrder, reporter: Reporter) -> DiagnosisResult:
         raise CommandError(f"--effects: {unknown[0]!r} is not one of {', '.join(EFFECTS)}")
     measurement = load_measurement(order.folder)
     check_vacant(order.out, resume=order.resume)
+    if order.follow_up and order.follow_up.resolve() == (order.out / NEXT).resolve():
+        raise CommandError(
+            f"--follow-up {order.follow_up}: lies in --out, which holds the answer before it; allowed: another --out"
+        )
     follow_ups = measured_so_far(order.follow_up) if order.follow_up else ()
     earlier = NOTHING_BEFORE
     if order.given is not None:
@@ -167,7 +171,9 @@ def run_diagnose(order: DiagnoseOrder, reporter: Reporter) -> DiagnosisResult:
     # Start the executor before writing to the folder: perhaps no scheduler answers.
     with kept_for_one(order.out), executor(order.threads, order.scheduler) as pool:
         reporter.begin(order.out, order.resume)
-        return _run(order, measurement, follow_ups, earlier, pool, reporter)
+        known = {one.folder.resolve() for one in earlier.follow_ups}
+        new = [one for one in follow_ups if one.folder.resolve() not in known]
+        return _run(order, measurement, new, earlier, pool, reporter)
 
 
 def _run(
@@ -230,8 +236,7 @@ def _run(
             say(f"{following}: exists already and is not changed, as it may be filled in{same}")
         else:
             names_taken = [condition.name for part in (measurement, *follow_ups) for condition in part.conditions]
-            before = (*read_next(order.follow_up).before, order.follow_up) if order.follow_up else ()
-            asked = found.suggestions[0]
+            asked, before = found.suggestions[0], [one.folder for one in follow_ups]
             write_next(following, order.folder, as_declared, asked, order.given, names_taken, before)
             what = "what to measure next" if found.suggestions[0].pours else "what of single bodies checks this answer"
             say(f"{following}: {what}, to be filled in; then --follow-up {following}")

@@ -266,12 +266,22 @@ def cautions(result: DiagnosisResult) -> list[str]:
             f"Fresh pours that broke off or left nothing to be read: {before} of the declared model, "
             f"{after} of the final one. Means are those of the others."
         )
-    poured = (*result.confirmation.before.conditions, *result.confirmation.after.conditions)
-    if lost := list(dict.fromkeys(row.condition for row in poured if row.pours < 2)):
-        found.append(
-            f"Not compared with fresh pours: {enumeration(lost)}. Fewer than two pours of a model gave every number "
-            "that was measured there: it is in no error of this report, and does not test the answer."
-        )
+    found += _not_compared(result)
+    return found
+
+
+def _not_compared(result: DiagnosisResult) -> list[str]:
+    """Conditions whose summaries fewer than two fresh pours of a model gave."""
+    models = result.confirmation.before, result.confirmation.after
+    before, after = ({row.condition: row.pours for row in model.conditions} for model in models)
+    found = []
+    for row in result.measured:
+        if min(before[row.condition], after[row.condition]) < 2:
+            untested = row.role == "holdout" and after[row.condition] < 2
+            found.append(
+                f"{row.condition} is in no error of this report: fewer than two fresh pours of the declared or of the "
+                f"final model gave all its summaries.{' It does not test the answer.' if untested else ''}"
+            )
     return found
 
 
@@ -372,7 +382,8 @@ def follow_up_text(result: DiagnosisResult) -> str:
     if first.bodies:
         what += f", with {numbers} of single bodies,"
     text = f"{what} would single out the right one with a chance of {percent(best.chance)}."
-    return f"{text} {FOLLOW_UPS_SO_FAR}"
+    # Counted on first follow-ups alone.
+    return text if result.order.follow_up else f"{text} {FOLLOW_UPS_SO_FAR}"
 
 
 def _facts(result: DiagnosisResult) -> list[tuple[str, str]]:

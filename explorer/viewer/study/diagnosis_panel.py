@@ -16,7 +16,7 @@ from doe.record import RecordError
 from explorer.background.command_process import CommandStatus
 from explorer.background.output_folder import ResultFile
 from explorer.diagnosis.follow_up_tables import add_scan, packed, read_follow_up, take_filled
-from explorer.diagnosis.next_folder import NEXT, ORDER, read_next
+from explorer.diagnosis.next_folder import NEXT, ORDER, measured_so_far
 from explorer.diagnosis.piles import AnswerPiles, answer_piles
 from explorer.diagnosis.process import RESULT, Question
 from explorer.diagnosis.result import CORRECTED_STUDY, SHORT_PROFILE, DiagnosisResult
@@ -414,7 +414,7 @@ class FollowUp:
         result, folder = self._asked()
         # Read here first: missing or wrong data are reported at once, not by a process that has failed.
         self._page.background.start(
-            "reading the follow-up", lambda: read_next(folder), lambda _: self._begin(result, folder)
+            "reading the follow-up", lambda: measured_so_far(folder), lambda _: self._begin(result, folder)
         )
 
     def _asked(self) -> tuple[DiagnosisResult, Path]:

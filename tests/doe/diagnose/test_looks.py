@@ -54,5 +54,5 @@ def test_an_effect_that_two_looks_leave_named_gets_no_third(steps, looks, monkey
     training = Rehearsed(steps)
     monkeypatch.setattr(diagnosis, "weighed", training.compared)
     monkeypatch.setattr(diagnosis, "inseparable", lambda compared, name: "")
-    diagnosis.pursued(training, SimpleNamespace(fit=(), bodies=()), Budget(), print, None)
+    diagnosis.pursued(training, SimpleNamespace(fit=(), bodies=()), Budget(), print, ())
     assert training.looks == looks

@@ -537,7 +537,7 @@ def test_without_held_out_conditions_nothing_is_confirmed_or_taken_back(measurem
     measure(monkeypatch, (), seed=1)
     declared = declare(measurement, NAMES[:1])
     training = TrainingPours(declared, measurement.fit, FormulaPours(measurement.fit, (), None, None), BUDGET, print)
-    compared = diagnosis.pursued(training, measurement, BUDGET, print, None)
+    compared = diagnosis.pursued(training, measurement, BUDGET, print, ())
     verdict = diagnosis.verdict_of(compared, declared, training.pours, ())
     conclusion, after = diagnosis.concluded(verdict, compared, declared, (), FormulaPours((), (), None, None), print)
     assert after == verdict

@@ -247,6 +247,10 @@ def test_a_check_by_bodies_has_their_table_and_no_other(tmp_path, measured):
     write_bodies(folder, tables.bodies)
     take_filled(folder, CHECK, "back.zip", sent, tmp_path / "uploads")
     assert read_follow_up(folder).bodies[0].mean == "0.115"
+    # The same numbers asked for once more, with those of the first time among the data.
+    write_next(tmp_path / "again", SOURCE, measured, CHECK, before=[folder])
+    with pytest.raises(CommandError, match=r"^back\.zip: follow_up\.json: is that of another follow-up"):
+        take_filled(tmp_path / "again", CHECK, "back.zip", sent, tmp_path / "uploads")
 
 
 # On the page

@@ -26,7 +26,7 @@ from solver import value, with_values
 from solver.assets import measurement_folder
 from tests.explorer.command_line import explorer
 from tests.explorer.diagnosed import CASES, diagnosed, result_of_case, typed
-from tests.explorer.diagnosis.test_next_folder import SOURCE, TWICE, fill, suggestion, values_of
+from tests.explorer.diagnosis.test_next_folder import CHECK, SOURCE, TWICE, fill, suggestion, values_of
 from tests.explorer.diagnosis.test_next_folder import written as write_next_folder
 
 
@@ -274,14 +274,35 @@ def test_an_answer_after_a_follow_up_asks_for_the_next_one(tmp_path, asked):
     assert names == [[first], [first], [second]]
     assert first != second
     assert read_next(folders[2]).before == tuple(folders[:2])
-    # What is missing beside that answer is asked with both as well.
+    readme = (folders[1] / "README.md").read_text(encoding="utf-8")
+    assert f"It reads `{folders[0]}` too, which has to stay where it is." in readme
+    assert "53 of 59" not in readme
+    for folder in folders[:2]:
+        refused = explorer("diagnose", str(SOURCE), "--out", str(folder.parent), "--resume", "--follow-up", str(folder))
+        assert (refused.exit_code, "lies in --out" in refused.stderr) == (2, True)
+
+
+def test_an_answer_with_follow_ups_is_gone_on_from_with_each_of_them_once(tmp_path, asked):
+    """Its own check asks for single bodies again, and reads them with those before it."""
+    measured, store = load_measurement(SOURCE), ("--store", str(tmp_path / "pours.sqlite"))
+    first, second = tmp_path / "first/next", tmp_path / "second/next"
+    for folder, before in [(first, ()), (second, (first,))]:
+        write_next(folder, SOURCE, measured, CHECK, before=before)
+        table = folder / "bodies.csv"
+        table.write_text(table.read_text().replace("# trefoil,mass,g,,", "trefoil,mass,g,0.21,0.002"))
     content = result_of_case("effect")
-    content["order"]["follow_up"], content["data"]["folder"] = str(folders[1]), str(SOURCE)
-    earlier = earlier_answer(written(tmp_path / "answer", content), SOURCE)
-    assert [one.folder for one in earlier.follow_ups] == folders[:2]
-    folders[0].rename(tmp_path / "taken away")
-    gone = explorer("diagnose", str(SOURCE), "--out", str(tmp_path / "3"), "--follow-up", str(folders[1]), *store)
-    assert (gone.exit_code, f"{folders[0]}/follow_up.json: no such file" in gone.stderr) == (2, True)
+    content["order"]["follow_up"], content["data"]["folder"] = str(first), str(SOURCE)
+    written(second.parent, content)
+    assert [one.folder for one in earlier_answer(second.parent, SOURCE).follow_ups] == [first]
+    words = ("--given", str(second.parent), "--follow-up", str(second), "--out", str(tmp_path / "third"))
+    done = explorer("diagnose", str(SOURCE), *words, *store)
+    assert done.exit_code == 0, done.stderr
+    ((joined_before, _, (last,)),) = asked
+    assert (len(joined_before.bodies), last.folder, len(last.bodies)) == (1, second, 1)
+    (tmp_path / "first").rename(tmp_path / "taken away")
+    gone = explorer("diagnose", str(SOURCE), "--follow-up", str(second), "--out", str(tmp_path / "fourth"))
+    told = f"{second}/follow_up.json: before: {first}/follow_up.json: no such file"
+    assert (gone.exit_code, told in gone.stderr) == (2, True), gone.stderr
 
 
 def test_a_diagnosis_gone_on_with_leaves_a_follow_up_that_is_filled_in(tmp_path, asked):

@@ -277,6 +277,7 @@ def test_a_row_without_its_value_is_named(tmp_path, measured):
         ('{"schema": 1, "rivals": ["base"], "change": "x"}', "rivals: "),
         ('{"schema": 1, "rivals": ["base", "twisting"]}', "change: None"),
         ('{"schema": 1, "rivals": ["base", "twisting"], "change": "x", "before": "next"}', "before: 'next'; allowed: "),
+        ('{"schema": 1, "rivals": ["base", "twisting"], "change": "x", "before": [1]}', r"before: \[1\]; allowed: "),
     ],
 )
 def test_what_is_no_follow_up_is_refused(tmp_path, text, wanted):

@@ -164,15 +164,19 @@ def test_cautions_say_what_the_numbers_cannot(results):
     assert "Only 6 effects were considered" in texts["effect"]
     for text in texts.values():
         assert "Fresh pours that broke off or left nothing to be read: 1 of the declared model" in text
-        assert "Not compared with fresh pours" not in text
+        assert "is in no error of this report" not in text
 
 
 def test_a_condition_that_fresh_pours_do_not_reach_is_named(results):
     result = copy.deepcopy(results["effect"])
-    row = result["confirmation"]["after"]["conditions"][-1]
-    row["pours"] = 1
-    (said,) = (text for text in cautions(result) if text.startswith("Not compared with fresh pours"))
-    assert row["condition"] in said
+    role = {row["condition"]: row["role"] for row in result["measured"]}
+    for model, tests in [("before", True), ("after", False)]:
+        row = result["confirmation"][model]["conditions"][-1]
+        assert role[row["condition"]] == "holdout"
+        row["pours"] = 1
+        (said,) = (text for text in cautions(result) if "is in no error of this report" in text)
+        assert said.startswith(row["condition"])
+        assert ("does not test the answer" in said) != tests
 
 
 def test_a_correction_that_held_out_data_do_not_bear_out_is_called_so(results):
