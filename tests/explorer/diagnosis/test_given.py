@@ -29,6 +29,8 @@ from tests.explorer.diagnosed import CASES, diagnosed, result_of_case, typed
 from tests.explorer.diagnosis.test_next_folder import CHECK, SOURCE, TWICE, fill, suggestion, values_of
 from tests.explorer.diagnosis.test_next_folder import written as write_next_folder
 
+pytestmark = pytest.mark.usefixtures("unprinted")
+
 
 def written(folder, content):
     folder.mkdir(exist_ok=True)
