@@ -8,7 +8,7 @@ from pathlib import Path
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.report.content import Report, Section
 from explorer.report.data import diagnosis_data
-from explorer.report.diagnosis.answer import banner, could_have_seen, in_short, rivals
+from explorer.report.diagnosis.answer import banner, in_short
 from explorer.report.diagnosis.evidence import (
     effects,
     error,
@@ -19,6 +19,7 @@ from explorer.report.diagnosis.evidence import (
     single_bodies,
 )
 from explorer.report.diagnosis.method import data, for_a_paper, how_reached, repeat
+from explorer.report.diagnosis.rivals import could_have_seen, rivals
 from explorer.report.html import page
 from explorer.report.markdown import document
 from explorer.report.methods import diagnosis_references

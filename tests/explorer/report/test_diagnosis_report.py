@@ -13,8 +13,8 @@ from doe.diagnose.posterior import TEMPERATURE
 from doe.record import RecordError, VersionError
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.report.content import Table
-from explorer.report.diagnosis.answer import VISIBLE
 from explorer.report.diagnosis.charts import MOST_RESIDUALS, bands
+from explorer.report.diagnosis.rivals import VISIBLE
 from explorer.report.diagnosis.wording import (
     chance,
     feature_label,
