@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from explorer.commands.shared_options import AUTHOR, NOTES, RESULT_JSON, report_option
+from explorer.commands.shared_options import AUTHOR, NOTES, RESULT_JSON, parts_of, report_option
 from explorer.design.choices import ModelOrder, Reduction, Surrogate
 
 
@@ -63,8 +63,8 @@ def analyse(
         target_error=target_error,
         factors=factors,
         order=model,
-        terms=_names(terms),
-        only=_names(only),
+        terms=parts_of(terms),
+        only=parts_of(only),
         block=block,
         random=random,
         reduction=reduce,
@@ -77,7 +77,3 @@ def analyse(
     typer.echo(json_text(result.to_dict()) if json else analysis_text(result))
     if report is not None and not json:
         typer.echo(f"\nwrote {report / 'report.html'}, report.md, result.json")
-
-
-def _names(text: str) -> tuple[str, ...]:
-    return tuple(name.strip() for name in text.split(",") if name.strip())

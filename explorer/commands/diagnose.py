@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from explorer.commands.shared_options import AUTHOR, EVENTS, NOTES, RESUME, SCHEDULER, STORE, THREADS
+from explorer.commands.shared_options import AUTHOR, EVENTS, NOTES, RESUME, SCHEDULER, STORE, THREADS, parts_of
 
 
 def diagnose(
@@ -58,11 +58,10 @@ def diagnose(
     check_scheduler(scheduler, threads)
 
     end_as_by_ctrl_c()
-    names = tuple(name.strip() for name in effects.split(",") if name.strip())
     order = DiagnoseOrder(
         folder=measurement_folder(folder),
         out=out,
-        effects=names,
+        effects=parts_of(effects),
         budget=budget,
         resume=resume,
         store=store,

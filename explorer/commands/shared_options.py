@@ -36,6 +36,11 @@ TOKEN = typer.Option(
 )
 
 
+def parts_of(text: str) -> tuple[str, ...]:
+    """The parts of an option that is a list with commas."""
+    return tuple(part.strip() for part in text.split(",") if part.strip())
+
+
 def report_option(result: str, *names: str) -> Any:
     """Return the option, with these ``names``, for a new folder with a report and its data file ``result``."""
     text = f"New folder for the report, its figures and data, and {result}."
