@@ -10,12 +10,15 @@ const LATEST_MS = 10000;  // until which what stands in a room may still come
 let channel = null, sought = null;
 let restoring = true;  // the rooms of the page that was left, until somebody opens one
 
-// What is asked for while the page still connects is sent once it has; after that, only while it is connected.
+// What is asked for while the page still connects is sent once it has; after that, only while it is connected: returns
+// whether it is or will be sent.
 let unsent = [];
 function send(command) {
   const text = JSON.stringify(command);
   if (channel && channel.readyState === WebSocket.OPEN) channel.send(text);
-  else unsent?.push(text);
+  else if (unsent) unsent.push(text);
+  else return false;
+  return true;
 }
 
 const tabs = () => [...document.querySelectorAll("#root [role=tab]")];
@@ -198,7 +201,7 @@ function offerPour(text) {
     `seed ${fields.get("seed") || 0}`, `up to ${Number(fields.get("time") || 0).toFixed(3)} s`];
   const done = () => { offer.hidden = true; };
   offer.replaceChildren(element("span", {}, "This link holds another pour: ", element("b", {}, named.filter(Boolean).join(", "))),
-    element("button", { class: "main", onclick: () => { send({ do: "pour_link", text }); done(); } }, "Pour it"),
+    element("button", { class: "main", onclick: () => { if (send({ do: "pour_link", text })) done(); } }, "Pour it"),
     element("button", { onclick: done }, "Leave it"));
   offer.hidden = false;
 }
