@@ -103,8 +103,7 @@ def run_diagnosis(
     the order in which they were asked for. ``plan_next``: whether to look for what could be measured next.
     """
     declared, paths = declare(measurement, effects), [p.path for p in measurement.parameters]
-    for follow_up in follow_ups:
-        measurement = joined(measurement, follow_up)
+    measurement = joined(measurement, *follow_ups)
     root = ROOT if seed == 0 else FIRST_OTHER_ROOT + seed
 
     def pours_in(conditions: Sequence[Condition], place: int | None = None) -> ModelPours:
@@ -141,21 +140,21 @@ def run_diagnosis(
     )
 
 
-def joined(measurement: Measurement, follow_up: Measurement) -> Measurement:
-    """Return ``measurement`` with the fitted conditions and the single bodies of ``follow_up``.
+def joined(measurement: Measurement, *follow_ups: Measurement) -> Measurement:
+    """Return ``measurement`` with the fitted conditions and the single bodies of ``follow_ups``, in their order.
 
-    Raises MeasurementError if the follow-up has other parameters, or a condition whose name is already used.
+    Raises MeasurementError if a follow-up has other parameters, or a condition whose name is already used.
     """
-    if follow_up.conditions and follow_up.parameters != measurement.parameters:
-        raise MeasurementError(f"{follow_up.folder}: its [parameters] differ from those of {measurement.folder}")
-    known = {condition.name for condition in measurement.conditions}
-    for condition in follow_up.fit:
-        if condition.name in known:
-            raise MeasurementError(
-                f"{follow_up.folder}: condition {condition.name!r} is already in {measurement.folder}"
-            )
-    conditions = (*measurement.fit, *follow_up.fit, *measurement.holdout)
-    return replace(measurement, conditions=conditions, bodies=(*measurement.bodies, *follow_up.bodies))
+    for one in follow_ups:
+        if one.conditions and one.parameters != measurement.parameters:
+            raise MeasurementError(f"{one.folder}: its [parameters] differ from those of {measurement.folder}")
+        known = {condition.name for condition in measurement.conditions}
+        for name in (condition.name for condition in one.fit):
+            if name in known:
+                raise MeasurementError(f"{one.folder}: condition {name!r} is already in {measurement.folder}")
+        conditions = (*measurement.fit, *one.fit, *measurement.holdout)
+        measurement = replace(measurement, conditions=conditions, bodies=(*measurement.bodies, *one.bodies))
+    return measurement
 
 
 def pursued(

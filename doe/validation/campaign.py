@@ -213,8 +213,7 @@ class Answers:
         The diagnosis does not see ``truth``, which only fills and scores the row.
         """
         declared, say = self.strengths.declared, _silent
-        for follow_up in follow_ups:
-            measurement = joined(measurement, follow_up)
+        measurement = joined(measurement, *follow_ups)
         fitted, held = self.model_pours(measurement.fit), self.model_pours(measurement.holdout)
         training = TrainingPours(declared, measurement.fit, fitted, self.budget, say)
         compared = pursued(training, measurement, self.budget, say, follow_ups)

@@ -118,14 +118,10 @@ class Earlier:
 
         New ``follow_ups`` also have the effects in their models, within the same ranges: those that all rigs allow.
         """
-        for one in self.follow_ups:
-            measurement = joined(measurement, one)
+        measurement = joined(measurement, *self.follow_ups)
         if not self.given:
             return measurement, tuple(follow_ups)
-        everything = measurement
-        for one in follow_ups:
-            everything = joined(everything, one)
-        everything = with_given(everything, self.given)
+        everything = with_given(joined(measurement, *follow_ups), self.given)
         made = {one.name: one for one in everything.conditions}
 
         def own(part: Measurement) -> Measurement:
@@ -168,12 +164,12 @@ def run_diagnose(order: DiagnoseOrder, reporter: Reporter) -> DiagnosisResult:
         earlier = earlier_answer(order.given, order.folder)
     if set(order.effects or EFFECTS) <= set(earlier.given):
         raise CommandError("--effects: all of them are already in the model by --given; allowed: at least one other")
+    known = {one.folder.resolve() for one in earlier.follow_ups}
+    follow_ups = tuple(one for one in follow_ups if one.folder.resolve() not in known)
     # Start the executor before writing to the folder: perhaps no scheduler answers.
     with kept_for_one(order.out), executor(order.threads, order.scheduler) as pool:
         reporter.begin(order.out, order.resume)
-        known = {one.folder.resolve() for one in earlier.follow_ups}
-        new = [one for one in follow_ups if one.folder.resolve() not in known]
-        return _run(order, measurement, new, earlier, pool, reporter)
+        return _run(order, measurement, follow_ups, earlier, pool, reporter)
 
 
 def _run(
@@ -230,15 +226,15 @@ def _run(
             "adds it"
         )
     if found.suggestions:
-        following = order.out / NEXT
+        asked, following = found.suggestions[0], order.out / NEXT
         if (following / ORDER).is_file():  # from a run that was stopped after writing it, or one that is continued
-            same = "" if asks_for(following, found.suggestions[0]) else "; it is not what this answer asks for"
+            same = "" if asks_for(following, asked) else "; it is not what this answer asks for"
             say(f"{following}: exists already and is not changed, as it may be filled in{same}")
         else:
             names_taken = [condition.name for part in (measurement, *follow_ups) for condition in part.conditions]
-            asked, before = found.suggestions[0], [one.folder for one in follow_ups]
+            before = [one.folder for one in follow_ups]
             write_next(following, order.folder, as_declared, asked, order.given, names_taken, before)
-            what = "what to measure next" if found.suggestions[0].pours else "what of single bodies checks this answer"
+            what = "what to measure next" if asked.pours else "what of single bodies checks this answer"
             say(f"{following}: {what}, to be filled in; then --follow-up {following}")
     if order.apply:
         write_whole(order.out / CORRECTED, corrected_toml(measurement, found))
