@@ -12,12 +12,10 @@ the effect, γ_e the departure of its response from proportionality, and x_e the
 (one number for all features; bodies that stick come down in lumps). All pours enter one regression: parameters vary in
 every pour, the base model is known better through features that the effects do not move, and errors that two models
 share appear in both. The prior variance v of a signature is learned from all signatures, one variance along each
-principal axis: effects of a granular pour move its features along few directions, and along the others a handful of
-pours shows mostly scatter (empirical Bayes; Efron & Morris 1973, doi 10.1080/01621459.1973.10481350). Of an eigenvalue
-of the signatures' scatter, only the excess over the largest that noise alone produces counts, ν (1 + √(D/m))² for m
-signatures of noise ν in D features (Marchenko & Pastur 1967, doi 10.1070/SM1967v001n04ABEH001994); what else they
-vary by is spread evenly over all axes. A condition with more measured pours than the others has more weight in z, and
-its pours more variance: that of a pour along an axis is n = Σ w_i A_i² for weights w and axis A.
+principal axis (``doe/analysis/empirical_bayes.py``): effects of a granular pour move its features along few directions,
+and along the others a handful of pours shows mostly scatter. A condition with more measured pours than the others has
+more weight in z, and its pours more variance: that of a pour along an axis is n = Σ w_i A_i² for weights w and axis A.
+Views of one pour, displaced or turned, share part of its noise (``doe/analysis/clusters.py``).
 
 Before all this each feature x of a pour becomes  s asinh((x − x̄)/(s σ)),  s = ``SQUASH``, because counts and masses
 that are zero in most pours of the base model reach hundreds of its variances under an effect.
@@ -36,7 +34,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag
 
+from doe.analysis.clusters import decorrelated, intraclass_correlation
 from doe.analysis.covariance import pooled_slopes, residuals_within, shrunk_covariance
+from doe.analysis.empirical_bayes import LEAST_VARIANCE, prior_along_axes, relative_sizes
 from doe.analysis.squash import Squash, squash_of
 from doe.errors import StatisticsError
 
@@ -48,10 +48,6 @@ CURVATURE = 0.5
 BEND = 0.25
 """The same for a parameter. In the reference pours it is 0.2 for restitution, and too small to be measured for the
 frictions."""
-LEAST_VARIANCE = 1e-3
-"""Least variance of a signature along an axis, for estimates near zero."""
-SCALES = np.geomspace(0.003, 3.0, 31)
-"""Trial values for the variance of one signature relative to that of all signatures."""
 FEW_POURS = 2.0
 """Weight of the prior belief that an effect leaves the scatter unchanged [pours at the reference amplitude]."""
 SCATTERS = (0.5, 4.0)
@@ -97,8 +93,8 @@ class Lessons:
         Parameters [standard deviations from their means], (n, k).
     way, amplitude
         Index of the way that acts, −1 for the base model, and multiple of its reference amplitude, (n,).
-    own
-        Whether a pour counts for the covariance of a pour, (n,); False for another view of a pour already counted.
+    pour
+        Number of the pour, (n,); equal for views of one pour.
     blocks
         Features by condition, (n, d_c).
     """
@@ -106,7 +102,7 @@ class Lessons:
     theta: FloatArray
     way: npt.NDArray[np.int64]
     amplitude: FloatArray
-    own: npt.NDArray[np.bool_]
+    pour: npt.NDArray[np.int64]
     blocks: tuple[FloatArray, ...]
 
     def __len__(self) -> int:
@@ -120,7 +116,12 @@ class Lessons:
     def where(self, rows: npt.NDArray[np.bool_]) -> Lessons:
         """Return the pours selected by ``rows``."""
         blocks = tuple(block[rows] for block in self.blocks)
-        return Lessons(self.theta[rows], self.way[rows], self.amplitude[rows], self.own[rows], blocks)
+        return Lessons(self.theta[rows], self.way[rows], self.amplitude[rows], self.pour[rows], blocks)
+
+    @property
+    def own(self) -> npt.NDArray[np.bool_]:
+        """Whether a pour is not another view of an earlier one, (n,)."""
+        return np.asarray(np.isin(np.arange(len(self)), np.unique(self.pour, return_index=True)[1]))
 
     @property
     def near(self) -> npt.NDArray[np.bool_]:
@@ -146,7 +147,7 @@ class Emulator:
     mean, covariance
         Of the c coefficients (b, J, β_1 … β_m, γ_1 … γ_m, Q) of every feature: (D, c = 1 + 2k + 2m) and (D, c, c).
     information
-        Xᵀ X of the training pours, (c, c).
+        Xᵀ X of the training pours with independent noise, (D, c, c).
     pour
         Variance of a base-model pour in every feature, (D,); 1 if all conditions have the same weight.
     freedom
@@ -244,7 +245,7 @@ class Emulator:
     def scatter(self, rows: FloatArray) -> FloatArray:
         """Covariance (n, n) of the means for ``rows`` over repeated sets of as many training pours, summed over z."""
         gained = rows @ self.covariance / np.sqrt(self.pour)[:, None, None]
-        return np.einsum("dni,ij,dmj->nm", gained, self.information, gained, optimize=True)
+        return np.einsum("dni,dij,dmj->nm", gained, self.information, gained, optimize=True)
 
     def noise(self, rows: FloatArray) -> FloatArray:
         """Variance of a pour over that of the base model's, (n,), for ``rows`` of the regression."""
@@ -306,9 +307,9 @@ def emulated(
     told = [lessons.amplitude[lessons.way == w] @ shift[lessons.way == w] / square[w] for w in range(m)]
     signatures = np.stack(told or [0.0 * z[0]])
     noise = 1.0 / square + 1.0 / lessons.near.sum() if m else np.ones(1)
-    variances, axes = signature_prior(signatures, noise, unturned)
+    variances, axes = prior_along_axes(signatures, noise, unturned)
     pour = unturned @ axes**2
-    scales = signature_scales(signatures @ axes, noise[:, None] * pour, variances) if m else np.zeros(0)
+    scales = relative_sizes(signatures @ axes, noise[:, None] * pour, variances) if m else np.zeros(0)
     if not shrunk:
         variances, scales = np.full_like(variances, variances.sum()), np.ones(m)
     rows = np.zeros((len(lessons), 1 + 2 * k + 2 * m))
@@ -319,11 +320,15 @@ def emulated(
     rows[acting, 1 + k + m + lessons.way[acting]] = a**2 - a
     excess = _excess(z, lessons, m)
     spread = np.sqrt(noise_of(rows[:, 1 + k : 1 + k + m], excess))[:, None]
-    rows = rows / spread
-    mean, covariance = regression(rows, z @ axes / spread, (slopes**2).mean(axis=1), variances, scales, pour)
+    rows, z = rows / spread, z @ axes / spread
+    alike = _alike(z, lessons)
+    rows, z = (decorrelated(one, lessons.pour, alike) for one in (rows, z.T[:, :, None]))
+    mean, covariance = regression(rows, z[:, :, 0], (slopes**2).mean(axis=1), variances, scales, pour)
     reached = tuple(float(lessons.amplitude[lessons.way == w].max()) for w in range(m))
     turned = axes.T @ whitening
-    return Emulator(tuple(ways), k, mean, covariance, rows.T @ rows, pour, freedom, squashes, turned, reached, excess)
+    return Emulator(
+        tuple(ways), k, mean, covariance, rows.swapaxes(1, 2) @ rows, pour, freedom, squashes, turned, reached, excess
+    )
 
 
 def noise_of(amplitudes: FloatArray, excess: FloatArray) -> FloatArray:
@@ -342,34 +347,6 @@ def _excess(z: FloatArray, lessons: Lessons, ways: int) -> FloatArray:
     return np.array([float(a @ some) / (float(a @ a) + FEW_POURS) for a, some in by_way])
 
 
-def signature_prior(signatures: FloatArray, noise: FloatArray, pour: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Prior variances v (D,) of ``signatures`` (m, D) along their principal axes, and these axes as columns, (D, D).
-
-    ``noise``: noise variance of each signature, (m,), times that of a ``pour`` in each feature, (D,). If pours are not
-    alike in all features, n and D of the largest eigenvalue are those with the same Σ n and Σ n².
-    """
-    (m, size), level = signatures.shape, float(noise.mean()) * pour
-    values, axes = np.linalg.eigh(signatures.T @ signatures / m)
-    alike = float((level**2).sum() / level.sum())
-    leading = np.maximum(values - alike * (1.0 + np.sqrt(level.sum() / alike / m)) ** 2, 0.0)
-    rest = max(LEAST_VARIANCE, float(values.sum() - level.sum() - leading.sum()) / size)
-    return leading + rest, axes
-
-
-def signature_scales(signatures: FloatArray, noise: FloatArray, variances: FloatArray) -> FloatArray:
-    """s (m,): size of each of ``signatures`` (m, D), along the axes of ``variances`` (D,), relative to the others.
-
-    ``noise``: variance of the noise in each of them, (m, D).
-    Maximizes the likelihood of β̂ ~ N(0, s v + noise). Without s, an effect that does hardly anything at the end of its
-    range, such as twisting friction under a pile of small bodies, would keep the freedom of a strong effect and, by the
-    noise of its own pours, agree with data of the base model better than the base model does.
-    """
-    square = signatures[:, None] ** 2
-    total = SCALES[None, :, None] * variances + noise[:, None]
-    likelihood = -0.5 * (np.log(total) + square / total).sum(axis=2)
-    return np.asarray(SCALES[likelihood.argmax(axis=1)], dtype=np.float64)
-
-
 def regression(
     rows: FloatArray, z: FloatArray, slopes: FloatArray, variances: FloatArray, scales: FloatArray, pour: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -378,7 +355,7 @@ def regression(
     Parameters
     ----------
     rows, z
-        Regressors and features of each pour, (n, c) and (n, D).
+        Regressors and value of every feature in each pour, (D, n, c) and (D, n).
     slopes
         Mean square of J over the features, (k,).
     variances, scales
@@ -386,15 +363,30 @@ def regression(
     pour
         Variance of a pour in every feature, (D,).
     """
-    columns, m, first = rows.shape[1], len(scales), 1 + len(slopes)
+    columns, m, first = rows.shape[2], len(scales), 1 + len(slopes)
     precision = np.full((len(variances), columns), FLAT)
     own = 1.0 / (variances[:, None] * scales)
     precision[:, first : first + m] = own
     precision[:, first + m : first + 2 * m] = own / CURVATURE**2
     precision[:, first + 2 * m :] = 1.0 / (BEND**2 * np.maximum(slopes, LEAST_VARIANCE))
-    covariance = np.linalg.inv((rows.T @ rows) / pour[:, None, None] + precision[:, :, None] * np.eye(columns))
-    mean = np.einsum("dij,jd->di", covariance, rows.T @ z / pour, optimize=True)
+    turned = rows.swapaxes(1, 2) / pour[:, None, None]
+    covariance = np.linalg.inv(turned @ rows + precision[:, :, None] * np.eye(columns))
+    mean = (covariance @ (turned @ z[:, :, None]))[:, :, 0]
     return np.asarray(mean, dtype=np.float64), np.asarray(covariance, dtype=np.float64)
+
+
+def _alike(z: FloatArray, lessons: Lessons) -> FloatArray:
+    """Correlation (D, n) of the noise of every pour with that of its other views, along each axis of ``z`` (n, D).
+
+    Views of the base model are displaced, and those of effects are turned.
+    """
+    group = lessons.groups()
+    several, noise = (np.bincount(group) > 1)[group], residuals_within(z, group, lessons.theta)
+    displaced = np.isin(lessons.pour, lessons.pour[lessons.way == -1])
+    alike = np.zeros_like(z)
+    for kind in (displaced, ~displaced):
+        alike[kind] = intraclass_correlation(noise[kind[several]], lessons.pour[kind & several])
+    return np.asarray(alike.T, dtype=np.float64)
 
 
 def _whitening(drawn_in: Sequence[FloatArray], own: Lessons) -> tuple[FloatArray, int]:

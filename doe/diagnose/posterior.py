@@ -351,7 +351,7 @@ def _pairs(weigher: _Weigher, singles: Mapping[str, _Nodes], least: float, floor
 
     Fits are coarse where the log evidence is below ``floor`` or far below that of another pair.
     """
-    shifts = {name: weigher.shifts(nodes.rows) for name, nodes in singles.items()}
+    shifts = {name: weigher.lengths(nodes.rows - weigher.base.rows) for name, nodes in singles.items()}
     found: dict[str, Fit] = {}
     for first, second in combinations([name for name in singles if shifts[name].max() >= least], 2):
         label, members = f"{first}+{second}", (singles[first], singles[second])
@@ -372,7 +372,7 @@ def _pair(
 
     cells = parted_cells(
         lambda i, j, size: weigher.densities(label, at(i, j, STEP**size)),
-        [math.log(STEP) * shift for shift in shifts],
+        [weigher.lengths(np.diff(each.rows, axis=0, append=each.rows[-1:])) for each in members],
         [shift >= least for shift in shifts],
         floor,
     )
@@ -394,10 +394,9 @@ class _Weigher:
         noise = np.maximum(self._data.scatter, self._emulator.noise(rows)) / self._data.replicates
         return mean, variance + noise[:, None]
 
-    def shifts(self, rows: FloatArray) -> FloatArray:
-        """Distance of the data predicted by ``rows`` from those of the base model [standard errors], (n,)."""
-        means = self._emulator.at(np.concatenate([self.base.rows, rows]))[0]
-        return np.asarray(np.sqrt(self._data.replicates) * np.linalg.norm(means[1:] - means[0], axis=1))
+    def lengths(self, changes: FloatArray) -> FloatArray:
+        """How far ``changes`` (n, c) of a row of the regression move the data [standard errors], (n,)."""
+        return np.asarray(np.sqrt(self._data.replicates) * np.linalg.norm(changes @ self._emulator.mean.T, axis=1))
 
     def bent(
         self, mean: FloatArray, variance: FloatArray, centre: FloatArray, prior: FloatArray

@@ -231,7 +231,7 @@ class TrainingPours:
 
     def told(self, probes: Sequence[Probe], rows: Sequence[Sequence[PointPour]]) -> Lessons:
         """Training data from pours of ``probes``, one per condition; NaN where one broke off or could not be read."""
-        blocks = []
+        blocks, number = [], dict[Point, int]()
         for pours in zip(*rows, strict=True):
             block = np.array([(*pour.summaries, *pour.surface) for pour in pours], dtype=np.float64)
             block[[not pour.valid for pour in pours]] = np.nan
@@ -240,7 +240,7 @@ class TrainingPours:
             np.array([self.declared.theta(probe.point.theta) for probe in probes]).reshape(len(probes), -1),
             np.array([probe.way for probe in probes], dtype=np.int64),
             np.array([probe.multiple for probe in probes], dtype=np.float64),
-            np.array([probe.point.view == AS_IT_IS for probe in probes]),
+            np.array([number.setdefault(probe.point.seen(AS_IT_IS), len(number)) for probe in probes], dtype=np.int64),
             tuple(blocks),
         )
 

@@ -215,12 +215,13 @@ class _Split:
 
 
 def joined(lessons: Sequence[Lessons]) -> Lessons:
-    """All of ``lessons``, one after the other."""
+    """All of ``lessons``, one after the other; no pour of one is a view of a pour of another."""
+    first = np.cumsum([0, *(one.pour.max(initial=-1) + 1 for one in lessons)])
     return Lessons(
         np.concatenate([one.theta for one in lessons]),
         np.concatenate([one.way for one in lessons]),
         np.concatenate([one.amplitude for one in lessons]),
-        np.concatenate([one.own for one in lessons]),
+        np.concatenate([one.pour + start for one, start in zip(lessons, first, strict=False)]),
         tuple(np.concatenate(blocks) for blocks in zip(*(one.blocks for one in lessons), strict=True)),
     )
 
@@ -229,7 +230,7 @@ def _lesson(blocks: Blocks, theta: FloatArray, way: int = -1, amplitude: float =
     """Lessons from pours with parameters ``theta`` (k,), cut to the same number in every condition."""
     n = min(map(len, blocks))
     return Lessons(
-        np.tile(theta, (n, 1)), np.full(n, way), np.full(n, amplitude), np.ones(n, bool), tuple(b[:n] for b in blocks)
+        np.tile(theta, (n, 1)), np.full(n, way), np.full(n, amplitude), np.arange(n), tuple(b[:n] for b in blocks)
     )
 
 

@@ -166,7 +166,7 @@ def lessons_of(world, declared, levels, draw):
             multiples.append(multiple)
             rows.append([world.pours(draw, c, 1, world.shift(c, at, acting))[0] for c in range(2)])
     blocks = tuple(np.array([row[c] for row in rows]) for c in range(2))
-    return Lessons(np.array(theta), np.array(ways), np.array(multiples), np.ones(len(rows), dtype=bool), blocks)
+    return Lessons(np.array(theta), np.array(ways), np.array(multiples), np.arange(len(rows)), blocks)
 
 
 class FormulaPours:

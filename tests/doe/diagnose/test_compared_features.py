@@ -21,7 +21,7 @@ def lessons(rng, conditions=1, number=40):
     blocks = [rng.standard_normal((n, D)) for _ in range(conditions)]
     for block in blocks:
         block[:, 0] += 4.0 * (way == 0)
-    return Lessons(np.zeros((n, 0)), way, (way == 0).astype(float), np.ones(n, bool), tuple(blocks))
+    return Lessons(np.zeros((n, 0)), way, (way == 0).astype(float), np.arange(n), tuple(blocks))
 
 
 def data(values, name="low", **more):
@@ -82,7 +82,7 @@ def test_a_pile_that_came_down_in_a_lump_is_no_evidence_against_a_model():
     rng, names = np.random.default_rng(0), tuple(f"height {k}" for k in range(45))
     way = np.repeat([-1, 0], 60)
     blocks = tuple(rng.standard_normal((120, 45)) + 0.5 * (way == 0)[:, None] for _ in range(2))
-    taught = Lessons(np.zeros((120, 0)), way, (way == 0).astype(float), np.ones(120, bool), blocks)
+    taught = Lessons(np.zeros((120, 0)), way, (way == 0).astype(float), np.arange(120), blocks)
     piles = rng.standard_normal((2, 6, 45))
     lump, wrong = piles.copy(), piles.copy()
     lump[0, 3, ::3] += SQUASH * np.sinh(5.0 / SQUASH)

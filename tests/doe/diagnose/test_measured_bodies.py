@@ -45,7 +45,7 @@ def compared(bodies: BodyEvidence | None):
     block = rng.standard_normal((300, 4))
     block[way >= 0] += 2.0 * np.eye(4)[0]
     theta = np.where(np.arange(300) % 2, 1.0, -1.0)[:, None]
-    taught = Lessons(theta, way, (way >= 0).astype(float), np.ones(300, bool), (block,))
+    taught = Lessons(theta, way, (way >= 0).astype(float), np.arange(300), (block,))
     values = rng.standard_normal((6, 4))
     values += 2.0 * np.eye(4)[0] - values.mean(axis=0)
     features = MeasuredFeatures("low", "scalars", ("a", "b", "c", "d"), values, np.zeros(4), scalars=4)

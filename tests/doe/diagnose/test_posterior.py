@@ -9,6 +9,7 @@ import pytest
 from scipy import stats
 
 from doe.analysis.covariance import log_t, shrunk_covariance
+from doe.analysis.empirical_bayes import prior_along_axes, relative_sizes
 from doe.analysis.squash import SQUASH, Squash
 from doe.diagnose.emulator import (
     ANGLES,
@@ -19,8 +20,6 @@ from doe.diagnose.emulator import (
     emulated,
     planar_weights,
     regression,
-    signature_prior,
-    signature_scales,
 )
 from doe.diagnose.posterior import (
     BEYOND,
@@ -62,7 +61,10 @@ def emulator(shifts, freedom=200, pours=12, sensitivity=None, variance=25.0, way
         z += [shift] * pours
     table = np.array(rows)
     table[:, 0] = 1.0
-    mean, covariance = regression(table, np.array(z), np.zeros(1), np.full(SIZE, variance), np.ones(m), np.ones(SIZE))
+    tables = np.tile(table, (SIZE, 1, 1))
+    mean, covariance = regression(
+        tables, np.array(z).T, np.zeros(1), np.full(SIZE, variance), np.ones(m), np.ones(SIZE)
+    )
     covariance[:, -1, -1] = 0.0  # the parameter's answer is known to be straight
     names = ways or tuple(Way(name, name) for name in shifts)
     return Emulator(
@@ -70,7 +72,7 @@ def emulator(shifts, freedom=200, pours=12, sensitivity=None, variance=25.0, way
         1,
         mean,
         covariance,
-        table.T @ table,
+        tables.swapaxes(1, 2) @ tables,
         np.ones(SIZE),
         freedom,
         (UNSQUASHED,) * 2,
@@ -107,16 +109,16 @@ def test_what_predictions_vary_by_is_what_the_noise_of_each_pour_does_to_them():
     rng = np.random.default_rng(5)
     theta, a = rng.standard_normal(9), np.repeat([0.0, 1.0, 2.0], 3)
     table = np.column_stack([np.ones(9), theta, a, a**2 - a, theta**2 - 1.0])
-    pour = np.geomspace(0.25, 4.0, SIZE)
+    tables, pour = np.tile(table, (SIZE, 1, 1)), np.geomspace(0.25, 4.0, SIZE)
     z, prior = rng.standard_normal((9, SIZE)), (np.full(1, 0.5), np.linspace(0.1, 9.0, SIZE), np.ones(1), pour)
-    mean, covariance = regression(table, z, *prior)
+    mean, covariance = regression(tables, z.T, *prior)
     taught = emulator({"push": np.zeros(SIZE)})
-    found = replace(taught, mean=mean, covariance=covariance, information=table.T @ table, pour=pour)
+    found = replace(taught, mean=mean, covariance=covariance, information=tables.swapaxes(1, 2) @ tables, pour=pour)
     asked = np.array([[1.0, 0.5, 1.5, 0.75, -0.75], [1.0, -1.0, 0.0, 0.0, 0.0]])
     expected = np.zeros((2, 2))
     for number in range(9):
         noisy = z + np.eye(9)[number][:, None] * np.sqrt(pour)
-        moved = asked @ (regression(table, noisy, *prior)[0] - mean).T
+        moved = asked @ (regression(tables, noisy.T, *prior)[0] - mean).T
         expected += moved @ moved.T
     assert found.scatter(asked) == pytest.approx(expected)
     assert found.placed(asked[:1] * [1, 0, 1, 1, 0], np.array([[0.5]])) == pytest.approx(asked[:1])
@@ -364,7 +366,7 @@ def lessons_of(sample, ways):
         n = len(blocks[0])
         theta = {"friction_0 -": -1.5, "friction_0 +": 1.5}.get(kind, 0.0)
         way, amplitude = ways.get(kind, (-1, 0.0))
-        parts.append(Lessons(np.full((n, 1), theta), np.full(n, way), np.full(n, amplitude), np.ones(n, bool), blocks))
+        parts.append(Lessons(np.full((n, 1), theta), np.full(n, way), np.full(n, amplitude), np.arange(n), blocks))
     return joined(parts)
 
 
@@ -396,7 +398,7 @@ def test_parameters_that_move_in_every_pour_cost_no_pours_of_their_own():
     features = theta * unit(5) + np.where(way == 0, 1.0, 0.0)[:, None] * 4.0 * unit(2)
     features = features + rng.standard_normal((120, SIZE))
     blocks = tuple(np.split(features, 2, axis=1))
-    taught = emulated(Lessons(theta, way, (way == 0).astype(float), np.ones(120, bool), blocks), [Way("push", "push")])
+    taught = emulated(Lessons(theta, way, (way == 0).astype(float), np.arange(120), blocks), [Way("push", "push")])
     assert np.linalg.norm(taught.slopes) == pytest.approx(1.0, rel=0.35)
     shift = taught.at(taught.row({0: 1.0})[None])[0] - base_of(taught)[0]
     assert np.linalg.norm(shift) == pytest.approx(4.0, rel=0.2)
@@ -418,7 +420,7 @@ def test_a_parameter_that_answers_bent_is_followed_where_it_was_poured_and_is_no
         theta, way = np.concatenate([near, more]), np.concatenate([push - 1, np.full(len(more), -1)])
         features = pours_at(theta) + np.where(way == 0, 1.0, 0.0)[:, None] * 3.0 * unit(3)
         blocks = tuple(np.split(features, 2, axis=1))
-        lessons = Lessons(theta, way, (way == 0).astype(float), np.ones(len(way), bool), blocks)
+        lessons = Lessons(theta, way, (way == 0).astype(float), np.arange(len(way)), blocks)
         taught = emulated(lessons, [Way("push", "push")])
         found[name] = judged(taught, taught.seen(np.split(measured, 2, axis=1)))
     assert found["near"].best[1] > 0.9
@@ -440,7 +442,7 @@ def test_pours_that_scatter_more_under_an_effect_are_known_to():
     deviation = np.sqrt(np.where(way == 0, 1.0 + 2.0 * amplitude, 1.0))
     features = amplitude[:, None] * unit(2) + deviation[:, None] * rng.standard_normal((240, SIZE))
     blocks = tuple(np.split(features, 2, axis=1))
-    lessons = Lessons(np.zeros((240, 1)), way, amplitude, np.ones(240, bool), blocks)
+    lessons = Lessons(np.zeros((240, 1)), way, amplitude, np.arange(240), blocks)
     taught = emulated(lessons, [Way("push", "push"), Way("pull", "pull")])
     # Of a normal feature of variance v, in units of the mean variance over all groups.
     g = np.linspace(-8.0, 8.0, 4001)
@@ -454,13 +456,16 @@ def test_pours_that_scatter_more_under_an_effect_are_known_to():
     assert noise == pytest.approx([1.0, 1.0 + 0.5 * taught.excess[0], 4.0])
 
 
-def test_a_pour_looked_at_otherwise_tells_nothing_of_the_scatter():
+def test_a_pour_looked_at_again_tells_nothing_more():
+    """A copy has all of the pour's noise, of which the model lets 5 % be its own: (1 + 0.95)/2 of one variance."""
     sample = sample_of(np.random.default_rng(0), {"push": 4.0 * unit(2)})
     lessons = lessons_of(sample, {"push": (0, 1.0)})
     copies = lessons.where(lessons.way == 0)
-    again = joined([lessons, replace(copies, own=np.zeros(len(copies), bool))])
-    one, other = (emulated(some, [Way("push", "push")]) for some in (lessons, again))
+    again = replace(joined([lessons, copies]), pour=np.concatenate([lessons.pour, copies.pour]))
+    one, other = (emulated(some, [Way("push", "push")], shrunk=False) for some in (lessons, again))
     assert one.freedom == other.freedom
+    u, seen_again = (taught.at(taught.row({0: 1.0})[None])[1].sum() for taught in (one, other))
+    assert seen_again == pytest.approx(0.975 * u, rel=0.01)
 
 
 def test_what_cannot_teach_is_refused():
@@ -491,7 +496,7 @@ def test_the_scatter_of_groups_of_two_is_that_of_one_pour():
     rng = np.random.default_rng(6)
     way = np.repeat(np.arange(-1, 30), 2)
     values = 3.0 * rng.standard_normal((62, 1)) + 10.0 * way[:, None]
-    lessons = Lessons(np.zeros((62, 0)), way, (way >= 0).astype(float), np.ones(62, bool), (values,))
+    lessons = Lessons(np.zeros((62, 0)), way, (way >= 0).astype(float), np.arange(62), (values,))
     taught = emulated(lessons, [Way(f"{k}", f"{k}") for k in range(30)])
     pairs = values.reshape(31, 2)
     assert taught.squashes[0].deviation == pytest.approx([np.sqrt(pairs.var(axis=1, ddof=1).mean())])
@@ -502,10 +507,10 @@ def test_the_scatter_of_groups_of_two_is_that_of_one_pour():
 def test_signatures_of_noise_alone_are_not_believed():
     rng = np.random.default_rng(0)
     noise = np.full(18, 0.2)
-    nothing, _ = signature_prior(np.sqrt(0.2) * rng.standard_normal((18, 90)), noise, np.ones(90))
+    nothing, _ = prior_along_axes(np.sqrt(0.2) * rng.standard_normal((18, 90)), noise, np.ones(90))
     assert nothing.max() < 0.1 * 0.2
     along = rng.standard_normal((18, 1)) * 5.0 * np.eye(90)[:1]
-    values, axes = signature_prior(along + np.sqrt(0.2) * rng.standard_normal((18, 90)), noise, np.ones(90))
+    values, axes = prior_along_axes(along + np.sqrt(0.2) * rng.standard_normal((18, 90)), noise, np.ones(90))
     assert values.max() == pytest.approx((along**2).sum() / 18, rel=0.3)
     assert abs(axes[0, values.argmax()]) > 0.95
     assert np.sort(values)[-2] < 0.1 * 0.2
@@ -556,7 +561,7 @@ def test_a_signature_that_is_only_noise_is_believed_to_be_small():
     variances, noise = np.geomspace(10.0, 0.1, 40), np.full((12, 40), 0.1)
     signatures = rng.normal(size=(12, 40)) * np.sqrt(variances + 0.1)
     signatures[0] = rng.normal(size=40) * np.sqrt(0.1)
-    scales = signature_scales(signatures, noise, variances)
+    scales = relative_sizes(signatures, noise, variances)
     assert scales[0] <= 0.03
     # The scale of 40 normal numbers has a standard error of √(2/40) = 0.22.
     assert np.all((scales[1:] > 0.4) & (scales[1:] < 2.0))

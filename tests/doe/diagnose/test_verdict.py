@@ -164,7 +164,7 @@ def test_the_tables_of_a_verdict_by_closed_form():
     theta = np.where(np.arange(400) % 2, 1.0, -1.0)[:, None]
     block = rng.standard_normal((400, 4)) + theta * np.eye(4)[1]
     block[way == 0] += np.eye(4)[0]
-    taught = Lessons(theta, way, (way == 0).astype(float), np.ones(400, bool), (block,))
+    taught = Lessons(theta, way, (way == 0).astype(float), np.arange(400), (block,))
     # Of the mean of these replicates each feature is what it is said to be.
     values = rng.standard_normal((6, 4))
     values += np.array([0.0, 2.0, 0.0, 3.0]) - values.mean(axis=0)
@@ -200,7 +200,7 @@ def test_strengths_know_what_bodies_say_of_the_parameters():
     way = np.repeat([-1, 0], 200)
     theta = np.where(np.arange(400) % 2, 1.0, -1.0)[:, None]
     block = rng.standard_normal((400, 4)) + (theta + (way == 0)[:, None]) * np.eye(4)[1]
-    taught = Lessons(theta, way, (way == 0).astype(float), np.ones(400, bool), (block,))
+    taught = Lessons(theta, way, (way == 0).astype(float), np.arange(400), (block,))
     values = rng.standard_normal((6, 4))
     values += np.eye(4)[1] - values.mean(axis=0)
     data = MeasuredFeatures("low", "scan", ("height", "width", "area", "lean"), values, np.zeros(4), scalars=1)
