@@ -16,6 +16,7 @@ from solver import TABLE, Number, Whole
 class Target(Record):
     """A measured observable: mean and standard deviation of ``n`` measurements, and the margin of equivalence.
 
+    The default of the margin is 2°; a study has to state that of any other observable (``doe/studies/study.py``).
     ``before_…``: mean and standard deviation of n pours of the model that this study improves on; None without one.
     A ``[[target]]`` of a study file.
     """

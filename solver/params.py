@@ -37,6 +37,9 @@ UNITS: dict[str, dict[str, float]] = {
 }
 """Unit suffixes understood for each SI unit, with their factor to SI."""
 
+ROUNDING = 1e-12
+"""Share of a parameter's range by which a level that was computed may miss its end."""
+
 _QUANTITY = re.compile(r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s]\S*)?\s*$")
 
 
@@ -77,6 +80,9 @@ class Parameter:
         if self.files:
             return self._file(value)
         number = parse_quantity(value, self.unit, self.path)
+        nearest = min(max(number, self.low), self.high)
+        if number != nearest and abs(number - nearest) <= ROUNDING * (self.high - self.low) < math.inf:
+            return nearest
         if not self.low <= number <= self.high:
             unit = "" if self.unit == "1" else f" {self.unit}"
             raise ParameterError(f"{self.path}: {number:g}{unit} is outside {self.low:g} … {self.high:g}{unit}")

@@ -39,11 +39,8 @@ from doe.record import Record
 from doe.run_records import FloatArray, Run, Runner, Setting, responses
 from doe.stages.stage import Bias, Chain, Stage
 from doe.studies.profile import Profile
-from doe.studies.study import CALIBRATED, Study
+from doe.studies.study import CALIBRATED, REFERENCE, Study
 from doe.target import experiment_of, is_angle, observed_text
-
-REFERENCE = "reference"
-"""Label of the setting in which nothing is changed."""
 
 
 @dataclass(frozen=True)

@@ -33,8 +33,8 @@ class VerificationResult(Record):
         """The findings of the verification in one line."""
         several = len(self.targets) > 1
         line = " ".join(
-            f"{f'{target.observable}: ' if several else ''}{test.statement} Relative error "
-            f"{test.relative_error_percent:.2f} %."
+            f"{f'{target.observable}: ' if several else ''}{test.statement}"
+            + ("" if target.mean == 0.0 else f" Relative error {test.relative_error_percent:.2f} %.")
             for target, test in zip(self.targets, self.tests, strict=True)
         )
         for target, found in zip(self.targets, self.tests, strict=True):

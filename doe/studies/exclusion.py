@@ -22,16 +22,25 @@ USUAL_SEED = 1
 
 @dataclass(frozen=True)
 class ExcludedRun:
-    """One excluded run of the response surface: its setting, experiment ("": the study's own rig), seed and reason."""
+    """One excluded run of the response surface: its setting, experiment ("": the study's own rig), seed and reason.
+
+    ``key``: the run's key in the store, which no pour of another scene has.
+    """
 
     label: str
     experiment: str
     seed: int
+    key: str
     reason: str
+
+    @staticmethod
+    def of(run: Run, reason: str) -> ExcludedRun:
+        """Return ``run``, excluded for ``reason``."""
+        return ExcludedRun(run.label, run.experiment, run.seed, run.key, reason)
 
     def is_of(self, run: Run) -> bool:
         """Return whether ``run`` is the excluded one."""
-        return (self.label, self.experiment, self.seed) == (run.label, run.experiment, run.seed)
+        return (self.label, self.experiment, self.key) == (run.label, run.experiment, run.key)
 
 
 def optimum_without(result: StudyResult, excluded: Sequence[ExcludedRun]) -> OptimumResult:

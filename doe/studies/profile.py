@@ -24,7 +24,8 @@ class Profile(Record):
     name: str = ""
     spheres: str = "standard"
     """Resolution of the bodies' shapes."""
-    mass: Annotated[float, Quantity("kg", above=0.0)] = 0.030
+    mass: Annotated[float, Quantity("kg", above=0.0)] | None = None
+    """Poured mass; None: that of the rig."""
     pilot_runs: Annotated[int, Whole(3)] = 20
     change_runs: Annotated[int, Whole(1)] = 10
     screening_replicates: Annotated[int, Whole(1)] = 3

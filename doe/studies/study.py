@@ -48,6 +48,7 @@ from solver import (
     parameters,
     plugged_in,
     read_toml,
+    value,
     with_set_up,
     with_values,
 )  # fmt: skip
@@ -135,6 +136,9 @@ def _require_inside(points: Points, key: str, name: str) -> None:
             'alpha = "face-centred" or "inscribed"'
         )
 
+
+REFERENCE = "reference"
+"""Label of the pilot's setting in which nothing is changed."""
 
 CALIBRATED = 3
 """Number of factors that pass from the screening to the ascent and the response surface."""
@@ -294,7 +298,7 @@ def load_study(name: str) -> Study:
 
 
 def with_profile(study: Study, name: str) -> tuple[Study, Profile]:
-    """Return the study with the shapes and the mass of profile ``name``, and that profile.
+    """Return the study with the shapes and the mass of profile ``name``, and that profile with the mass that is poured.
 
     Raises ParameterError if there is no such profile, its mixture leaves too few factors of the fallback list testable,
     it states a resolution in degrees for a target that is not an angle, or its response surface has no degrees of
@@ -303,8 +307,9 @@ def with_profile(study: Study, name: str) -> tuple[Study, Profile]:
     if name not in study.profiles:
         raise ParameterError(f"{study.file}: profile: {name!r} is not one of {', '.join(study.profiles)}")
     profile = study.profiles[name]
-    mass = {"rig.mass": profile.mass} if "rig.mass" in parameters(study.scene) else {}
+    mass = {"rig.mass": profile.mass} if profile.mass is not None and "rig.mass" in parameters(study.scene) else {}
     scene = with_values(study.scene, {"body.spheres": profile.spheres, **mass})
+    profile = replace(profile, mass=float(value(scene, "rig.mass")) if "rig.mass" in parameters(scene) else None)
     experiments = {
         name: with_values(other, {"body.spheres": profile.spheres}) for name, other in study.experiments.items()
     }
@@ -324,7 +329,11 @@ def with_profile(study: Study, name: str) -> tuple[Study, Profile]:
             f"{MIN_BODIES} bodies or more are needed"
         )
     _refuse_without_error(study, profile)
-    return replace(study, scene=scene, experiments=experiments), profile
+    # What is assumed of the shapes is what the profile pours.
+    assumed = tuple(
+        replace(one, reference=profile.spheres) if one.path == "body.spheres" else one for one in study.assumptions
+    )
+    return replace(study, scene=scene, experiments=experiments, assumptions=assumed), profile
 
 
 def _refuse_without_error(study: Study, profile: Profile) -> None:
@@ -350,13 +359,16 @@ def study_from(table: Settings, path: Path) -> Study:
     file = checked(StudyFile, table)
     scene = with_set_up(load_material(file.material, relative_to=path.parent), table, path.parent)
     factors = tuple(_factor(scene, entry) for entry in file.factor)
-    scene = with_values(scene, {factor.path: factor.reference for factor in factors})
     if len(factors) < CALIBRATED:
         raise StudyFileError(f"factor: {len(factors)} factors; at least {CALIBRATED} are needed")
     screening = main_effect_design(file.screening, "screening", "factor", SCREENING, factors, file.dummies)
     assumptions = tuple(_levels(scene, entry) for entry in file.assumption)
     _refuse_twins([*factors, *assumptions])
-    assumed = main_effect_design(file.assumptions, "assumptions", "assumption", ASSUMPTIONS, assumptions, None)
+    _require_room([*factors, *assumptions], [body.name for body in scene.bodies])
+    # A mass fraction that is set to what it is would scale the others by a rounding error.
+    assumed = {one.path: one.reference for one in assumptions if one.reference != value(scene, one.path)}
+    scene = with_values(scene, {one.path: one.reference for one in factors} | assumed)
+    beside = main_effect_design(file.assumptions, "assumptions", "assumption", ASSUMPTIONS, assumptions, None)
     for name in file.fallback:
         one_of(name, "fallback", [factor.name for factor in factors])
     if len(file.fallback) < CALIBRATED:
@@ -366,9 +378,13 @@ def study_from(table: Settings, path: Path) -> Study:
     given = observable_names(scene)
     experiments = _experiments(load_material(file.material, relative_to=path.parent), table, path, factors)
     readings = [*given, *(f"{name}/{one}" for name, other in experiments.items() for one in observable_names(other))]
-    for target in file.target:
+    for target, entry in zip(file.target, table["target"], strict=True):
         one_of(target.observable, "target.observable", readings)
         _require_possible(target)
+        if "margin" not in entry and not is_angle(target.observable):
+            raise StudyFileError(
+                f"target.margin: missing for {target.observable}; only an angle has a default, {target.margin:g}°"
+            )
     if experiment_of(file.target[0].observable):
         raise StudyFileError(
             f"target.observable: the first target, {file.target[0].observable}, has to be of the "
@@ -400,7 +416,7 @@ def study_from(table: Settings, path: Path) -> Study:
         estimators=tuple(dict.fromkeys([*(target.observable for target in file.target), *estimators])),
         seed=file.seed,
         screening_design=screening,
-        assumption_design=assumed,
+        assumption_design=beside,
         surface_design=second_order_design(file.surface, "surface", SURFACE, CALIBRATED),
         further=_further(file.stage),
         experiments=experiments,
@@ -476,6 +492,16 @@ def _refuse_twins(factors: list[Factor]) -> None:
             seen.add(value)
 
 
+def _require_room(factors: list[Factor], bodies: list[str]) -> None:
+    """Refuse mass fractions that cannot all be high at once."""
+    high = {one.path.split(".")[1]: float(one.high) for one in factors if one.path.endswith(".mass_fraction")}
+    if len(high) > 1 and (len(high) == len(bodies) or sum(high.values()) > 1.0):
+        raise StudyFileError(
+            f"factor.path: mass fractions of {', '.join(high)}, up to {sum(high.values()):g} together; allowed: up to "
+            "1, with at least one component left to take the rest"
+        )
+
+
 def _scan(scene: Scene, scan: ScanTable | None) -> tuple[str | None, tuple[float, ...]]:
     """(path, values [SI]) of the scan; (None, ()) without one."""
     if scan is None:
@@ -484,17 +510,17 @@ def _scan(scene: Scene, scan: ScanTable | None) -> tuple[str | None, tuple[float
     parameter = parameters(scene)[path]
     if not parameter.is_number or not scan.values:
         raise StudyFileError(f"scan.values: {path} over {scan.values!r}; a list of numbers is needed")
-    values = tuple(float(parameter.check(value)) for value in scan.values)
-    for value in values:
-        with_values(scene, {path: value})
+    values = tuple(float(parameter.check(one)) for one in scan.values)
+    for one in values:
+        with_values(scene, {path: one})
     return path, values
 
 
 def _changes(scene: Scene, changes: list[ChangeTable]) -> dict[str, Values]:
     found: dict[str, Values] = {}
     for entry in changes:
-        if entry.name in found:
-            raise StudyFileError(f"change.name: {entry.name!r} appears twice")
+        if entry.name in (*found, REFERENCE):
+            raise StudyFileError(f"change.name: {entry.name!r} appears twice or is that of the reference setting")
         if not entry.values:
             raise StudyFileError(f"change.values: {entry.name!r} changes nothing; a path and its value are needed")
         with_values(scene, entry.values)

@@ -11,7 +11,7 @@ from doe.provenance import About, PouredPile, SetUp
 from doe.record import Document, Record
 from doe.run_records import Run, Setting
 from doe.stages.ascent import AscentResult
-from doe.stages.pilot import REFERENCE, PilotResult
+from doe.stages.pilot import PilotResult
 from doe.stages.reach import ReachResult
 from doe.stages.scan import ScanResult
 from doe.stages.screening import ScreeningResult
@@ -19,7 +19,7 @@ from doe.stages.stage import FurtherResult
 from doe.stages.surface import OptimumResult, SurfaceResult
 from doe.stages.verification import VerificationResult
 from doe.studies.profile import Profile
-from doe.studies.study import TRIES, Factor, Study, Values
+from doe.studies.study import REFERENCE, TRIES, Factor, Study, Values
 from doe.target import Target
 from solver import ClumpFit, Outcome
 

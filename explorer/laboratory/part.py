@@ -152,10 +152,15 @@ def with_part(scene: Scene, table: Table) -> Scene:
                 struck |= {f"pair.{a}.{b}.{key}", f"pair.{b}.{a}.{key}"}
     settings |= {f"effect.{name}.{key}": value for name, entry in part.effect.items() for key, value in entry.items()}
     of_bodies = _of_bodies(part.body)
-    fractions = {path.split(".")[1]: value for path, value in of_bodies.items() if path.endswith(".mass_fraction")}
-    settings |= {path: value for path, value in of_bodies.items() if not path.endswith(".mass_fraction")}
+    fractions = [path.split(".")[1] for path in of_bodies if path.endswith(".mass_fraction")]
+    names = [body.name for body in scene.bodies]
+    if fractions and set(names) != set(fractions):
+        raise ParameterError(
+            f"body.*.mass_fraction: measured are {', '.join(fractions)}; the material has {', '.join(names)}"
+        )
+    settings |= of_bodies
     struck |= set(of_bodies)
-    scene = with_values(_with_fractions(scene, fractions), settings)
+    scene = with_values(scene, settings)
     return dataclasses.replace(scene, assumed=tuple(path for path in scene.assumed if path not in struck))
 
 
@@ -195,21 +200,6 @@ def _of_bodies(bodies: Sequence[PartBody]) -> dict[str, Any]:
             raise ParameterError(f"body: {body.name}: mass_fraction {body.mass_fraction:g}; allowed: 0 … 1")
         found |= {f"body.{body.name}.{key}": value for key, value in said.items()}
     return found
-
-
-def _with_fractions(scene: Scene, fractions: Mapping[str, float]) -> Scene:
-    """Set all fractions at once: set one by one, each would rescale those before it."""
-    if not fractions:
-        return scene
-    names = [body.name for body in scene.bodies]
-    if set(names) != set(fractions):
-        raise ParameterError(
-            f"body.*.mass_fraction: measured are {', '.join(fractions)}; the material has {', '.join(names)}"
-        )
-    if not math.isclose(sum(fractions.values()), 1.0, abs_tol=1e-6):
-        raise ParameterError(f"body.*.mass_fraction: add up to {sum(fractions.values()):g}, not to 1")
-    bodies = tuple(dataclasses.replace(body, mass_fraction=fractions[body.name]) for body in scene.bodies)
-    return dataclasses.replace(scene, bodies=bodies)
 
 
 def merged(one: Mapping[str, Any], other: Mapping[str, Any]) -> Table:

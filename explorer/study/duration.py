@@ -147,8 +147,10 @@ def stored_times(study: Study, profile: Profile, store: Path, experiment: str = 
     if not store.is_file():
         return []
     scene = study.scene_of(experiment)
-    mass = float(value(scene, "rig.mass")) if experiment and "rig.mass" in parameters(scene) else profile.mass
-    wanted: dict[str, float | str] = {RIG: scene.rig.name, "body.spheres": profile.spheres, "rig.mass": mass}
+    wanted: dict[str, float | str] = {RIG: scene.rig.name, "body.spheres": profile.spheres}
+    if "rig.mass" in parameters(scene):
+        own = None if experiment else profile.mass
+        wanted["rig.mass"] = float(value(scene, "rig.mass")) if own is None else own
     try:
         with closing(Store(store, pouring=False)) as kept:
             return kept.wall_times(study.name, wanted)

@@ -14,7 +14,7 @@ from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
 
 FILE = "excluded_runs.csv"
-HEADER = ["label", "experiment", "seed", "reason"]
+HEADER = ["label", "experiment", "seed", "key", "reason"]
 MOST_BYTES = 1_000_000
 
 
@@ -28,11 +28,12 @@ def load_excluded(folder: Path) -> tuple[ExcludedRun, ...]:
         raise CommandError(f"{file}: the header is not {','.join(HEADER)}")
     excluded = []
     for line, cells in rows:
-        if len(cells) != len(HEADER) or not cells[2].isdecimal() or not cells[3]:
+        if len(cells) != len(HEADER) or not cells[2].isdecimal() or not cells[3] or not cells[4]:
             raise CommandError(
-                f"{file}, line {line}: allowed: a setting, its experiment or an empty cell, a seed, a reason"
+                f"{file}, line {line}: allowed: a setting, its experiment or an empty cell, a seed, the key of a pour, "
+                "a reason"
             )
-        excluded.append(ExcludedRun(cells[0], cells[1], int(cells[2]), cells[3]))
+        excluded.append(ExcludedRun(cells[0], cells[1], int(cells[2]), cells[3], cells[4]))
     return tuple(excluded)
 
 
@@ -46,6 +47,6 @@ def keep_excluded(folder: Path, result: StudyResult, excluded: Sequence[Excluded
         if not any(one.is_of(run) for run in runs):
             raise CommandError(f"{one.label}, seed {one.seed}: no run of the response surface")
     text = io.StringIO()
-    rows = [[one.label, one.experiment, one.seed, one.reason] for one in excluded]
+    rows = [[one.label, one.experiment, one.seed, one.key, one.reason] for one in excluded]
     csv.writer(text, lineterminator="\n").writerows([HEADER, *rows])
     write_whole(folder / FILE, text.getvalue())

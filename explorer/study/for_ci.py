@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,10 +30,10 @@ def summary(result: StudyResult, compared: Sequence[Compared]) -> str:
     lines = [f"# {result.study.title}: calibration", ""]
     for target, test in zip(result.verification.targets, result.verification.tests, strict=True):
         name, found = target.observable, test.simulated
+        error = "" if target.mean == 0.0 else f"; relative error {test.relative_error_percent:.2f} %"
         lines += [
             f"**{test.verdict}**: {test.statement} Simulated {observed(name, found.mean)} "
-            f"(SD {observed(name, found.sd)}, n = {found.n}), measured {observed(name, target.mean)}; relative error "
-            f"{test.relative_error_percent:.2f} %.",
+            f"(SD {observed(name, found.sd)}, n = {found.n}), measured {observed(name, target.mean)}{error}.",
             "",
         ]
     lines += ["| parameter | value, 95 % interval, or the range that gives the target |", "|---|---|"]
@@ -84,6 +85,8 @@ class RelativeError:
         """What is wrong if the error is above ``limit`` percent (or not a number), else ""."""
         if self.percent <= limit:
             return ""
+        if math.isnan(self.percent):
+            return f"{self.name} cannot be told: the target is 0, or no pour is valid"
         return f"{self.name} {self.percent:.2f} % is above the limit of {limit:g} %"
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 import json
 import re
+import shlex
 from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
 from dataclasses import KW_ONLY, dataclass, replace
@@ -111,7 +112,7 @@ def run_study(order: StudyOrder, reporter: Reporter) -> StudyResult:
     # The page puts these files there before the start.
     own = [study.file, *([order.target] if order.target else [])]
     check_vacant(order.out, own=own, resume=order.resume)
-    _check_same(order.out, study)
+    _check_same(order.out, study, profile)
     if order.record is not None:
         from explorer.recordings.pour_recorder import check_recordings
 
@@ -144,7 +145,8 @@ def _run(
     if photographed is not None:
         photographed.copied(order.out / FOLDER)
         say(f"target: {photographed.line}")
-    say(f"{study.name}, profile {profile.name}: {sum(planned.values())} runs of {1e3 * profile.mass:g} g; store {path}")
+    grams = "" if profile.mass is None else f" of {1e3 * profile.mass:g} g"
+    say(f"{study.name}, profile {profile.name}: {sum(planned.values())} runs{grams}; store {path}")
     if not order.scheduler:  # how many cores those workers have is not known beforehand
         say(duration_text(study, profile, path, order.threads))
     progress = RunProgress(reporter, planned)
@@ -277,15 +279,23 @@ def _finished(out: Path, file: Path, profile: str) -> StudyResult | None:
     return result
 
 
-def _check_same(out: Path, study: Study) -> None:
-    """Raise CommandError if ``out`` holds the findings of another study, which continuing there would overwrite.
+def _check_same(out: Path, study: Study, profile: Profile) -> None:
+    """Raise CommandError if ``out`` holds the findings of another study or profile, which continuing would overwrite.
 
     This holds for results of any version of the program, whatever was changed in the study since.
     """
     described = (ResultFile(RESULT, PARTIAL).read(out) or {}).get("study")
-    name = described.get("name") if isinstance(described, dict) else None
+    if not isinstance(described, dict):
+        return
+    name, size = described.get("name"), described.get("profile")
     if isinstance(name, str) and name != study.name:
         raise CommandError(f"--out {out}: holds the study {name}, not {study.name}; name another folder")
+    other = size.get("name") if isinstance(size, dict) else None
+    if isinstance(other, str) and other != profile.name:
+        raise CommandError(
+            f"--out {out}: holds the profile {other} of {study.name}, not {profile.name}; name another folder, or "
+            f"continue with --profile {shlex.quote(other)}"
+        )
 
 
 class PartialResult:

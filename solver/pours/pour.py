@@ -46,7 +46,7 @@ from solver.pours.verdict import (
     stalled,
     verdict,
 )
-from solver.rigs.outlet import Obstruction, obstruction
+from solver.rigs.outlet import Obstruction, obstruction, waiting
 from solver.rigs.rig import Container, Switch
 from solver.scenes.scene import Scene, actual, pour_rig
 from solver.scenes.time_step import time_step
@@ -339,16 +339,17 @@ class Pour:
         """Whether the next body has long been due and finds no place: the rig is full to the feed opening."""
         return self.supply.overdue(self.time, SETTLE_LIMIT)
 
-    def _across(self) -> Obstruction | None:
-        """What lies across the outlet now."""
+    def _at_outlet(self) -> tuple[Obstruction | None, int]:
+        """What lies across the outlet now, and the number of bodies over it."""
         outlet, inside = self.rig.outlet, self.container
         if outlet is None:
-            return None
+            return None, 0
         bodies = self.bodies()
         there = np.hypot(bodies.position[:, 0], bodies.position[:, 1]) < inside.radius
         held = bodies.inside & there & (bodies.position[:, 2] > inside.height)
         spheres = member_spheres(self.scene, bodies)
-        return obstruction(outlet, inside.height, bodies, spheres, held, self.rig.keeps_material)
+        across = obstruction(outlet, inside.height, bodies, spheres, held, self.rig.keeps_material)
+        return across, waiting(outlet, inside.height, bodies, held)
 
     def _moment(self, row: Summary) -> Moment:
         moment = Moment(
@@ -364,7 +365,10 @@ class Pour:
             room=self.batch.capacity.contacts,
             poured_mass=self.supply.mass,
         )
-        return replace(moment, across=self._across()) if may_be_over(moment) else moment
+        if not may_be_over(moment):
+            return moment
+        across, number = self._at_outlet()
+        return replace(moment, across=across, waiting=number)
 
     def _ramp_steps(self) -> int:
         """Steps between two changes of the constants."""

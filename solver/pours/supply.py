@@ -80,8 +80,8 @@ class Supply:
         return self.missing > 0 and bool(self._due[self.entered] <= time)
 
     def overdue(self, time: float, by: float) -> bool:
-        """Whether the next body has been due for more than ``by`` [s]."""
-        return self.missing > 0 and bool(time > self._due[self.entered] + by)
+        """Whether the next body has been due, and has found no place, for more than ``by`` [s]."""
+        return self.missing > 0 and bool(time > max(self._due[self.entered], self.last_entry) + by)
 
     def placed(self, feed: Feed, there: Spheres, time: float, step: int) -> Iterator[tuple[int, Entry]]:
         """Number and entry of each body that is due, in order, until one finds no place beside ``there``."""

@@ -51,6 +51,8 @@ class Moment:
     """The charge: mass that was to be poured [kg]."""
     across: Obstruction | None = None
     """What lies across the outlet; looked for only when the pour may be over."""
+    waiting: int = 0
+    """Number of bodies in the container over its outlet; counted only then."""
 
 
 def verdict(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
@@ -139,8 +141,11 @@ def _come_to_rest(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
     if across is not None and (across.above > 0.0 or (stay and not rig.keeps_material)):
         return Outcome.OBSTRUCTED, _across(across, rig, moment)
     if rig.keeps_material:
-        stuck = row["discharged"] == 0.0
-        return (Outcome.JAMMED, f"nothing passes the outlet: {left}, stay") if stuck else (Outcome.AT_REST, "")
+        if row["discharged"] == 0.0:
+            return Outcome.JAMMED, f"nothing passes the outlet: {left}, stay"
+        if moment.waiting > numerics.hanging_bodies:
+            return Outcome.JAMMED, f"{moment.waiting} bodies stay over the outlet of the {_name(rig)}"
+        return Outcome.AT_REST, ""
     if stay:
         return Outcome.JAMMED, f"{row['hanging']:.0f} bodies ({left}) stay in the {_name(rig)}"
     if across is not None:

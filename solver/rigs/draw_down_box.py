@@ -104,7 +104,7 @@ class DrawDownBox(PourRig):
     @property
     def outlet(self) -> Slot:
         """The slot."""
-        return Slot(self.slot_width / 2.0)
+        return Slot(self.slot_width / 2.0, self.shelf_height - self.floor)
 
     def actions(self) -> tuple[Action, ...]:
         """The slot opens."""

@@ -37,12 +37,18 @@ class Outlet(Protocol):
         """Half of the narrowest way across [m]."""
         ...
 
+    @property
+    def depth(self) -> float:
+        """How far below its edge the container ends [m]."""
+        ...
+
 
 @dataclass(frozen=True)
 class RoundOutlet:
     """A circle; of an opening that is not round, the largest within it."""
 
     half_width: float
+    depth: float = 0.0
 
     def across(self, place: Array) -> Array:
         """See :class:`Outlet`."""
@@ -54,6 +60,7 @@ class Slot:
     """A slot along y."""
 
     half_width: float
+    depth: float = 0.0
 
     def across(self, place: Array) -> Array:
         """See :class:`Outlet`."""
@@ -77,31 +84,43 @@ class Obstruction:
 def obstruction(
     outlet: Outlet, height: float, bodies: Bodies, spheres: Spheres, held: npt.NDArray[np.bool_], keeps: bool
 ) -> Obstruction | None:
-    """The lowest body across ``outlet``, whose edge is at ``height`` [m]; None where there is none.
+    """The lowest body across ``outlet``; None where there is none.
+
+    ``height``: where the container ends [m], the outlet's ``depth`` below its edge.
 
     ``spheres``: the member spheres of ``bodies``. ``held``: which bodies are in the container, shape (n,). ``keeps``:
-    whether bodies beside the outlet belong there, so that only those over it are held up.
+    whether bodies beside the outlet belong there, so that only those over it count.
 
     A body across the outlet that rests on others which hang lower is part of an arch and does not count. The centre of
     mass of the body may be just below the edge, since the parts of it that bear on the edge are not.
     """
-    over = np.linalg.norm(outlet.across(bodies.position[:, :2]), axis=1) < outlet.half_width
+    over = _over(outlet, bodies)
+    counts = held & over if keeps else held
     lowest = np.full(bodies.mass.size, np.inf)
     np.minimum.at(lowest, spheres.body, spheres.centre[:, 2] - spheres.radius)
     for b in np.argsort(bodies.position[:, 2], kind="stable"):
         mine = (spheres.body == b) & (spheres.centre[:, 2] + spheres.radius >= height)
         if not bodies.inside[b] or not over[b] or not mine.any():
             continue
-        others = held & (np.arange(held.size) != b)
+        others = counts & (np.arange(held.size) != b)
         if (bodies.position[others, 2] < lowest[b]).any():
             return None
         if _reaches_both_sides(outlet, spheres.centre[mine, :2], spheres.radius[mine], bodies.position[b, :2]):
-            above = others & over if keeps else others
             name = bodies.component_names[bodies.component[b]]
-            gap = float(lowest[b]) - height
+            gap = float(lowest[b]) - height - outlet.depth
             wedged = gap if gap > outlet.half_width else 0.0
-            return Obstruction(name, float(bodies.mass[b]), float(bodies.mass[above].sum()), wedged)
+            return Obstruction(name, float(bodies.mass[b]), float(bodies.mass[others].sum()), wedged)
     return None
+
+
+def waiting(outlet: Outlet, height: float, bodies: Bodies, held: npt.NDArray[np.bool_]) -> int:
+    """Number of bodies in the container (``held``, (n,)) over ``outlet`` and above its edge. ``height`` as above."""
+    above = bodies.position[:, 2] > height + outlet.depth
+    return int((held & above & _over(outlet, bodies)).sum())
+
+
+def _over(outlet: Outlet, bodies: Bodies) -> npt.NDArray[np.bool_]:
+    return np.asarray(np.linalg.norm(outlet.across(bodies.position[:, :2]), axis=1) < outlet.half_width)
 
 
 def _reaches_both_sides(outlet: Outlet, place: Array, radius: Array, middle: Array) -> bool:

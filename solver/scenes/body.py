@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -163,10 +164,26 @@ def with_body_value(bodies: tuple[Body, ...], path: list[str], new: Any) -> tupl
     if path == ["spheres"]:
         return tuple(dataclasses.replace(body, spheres=new) for body in bodies)
     name, key = path
-    if key == "mass_fraction":
-        return _with_fraction(bodies, name, new)
     replaced = _with_size if key in SIZE_FIELDS else _with_dimension
     return tuple(replaced(body, key, new) if body.name == name else body for body in bodies)
+
+
+def with_fractions(bodies: tuple[Body, ...], new: Mapping[str, float]) -> tuple[Body, ...]:
+    """``bodies`` with shares replaced; the others scale to the rest, or share it equally if all are zero."""
+    total, others = sum(new.values()), [body for body in bodies if body.name not in new]
+    names = f"body.{next(iter(new))}.mass_fraction:" if len(new) == 1 else f"mass_fraction: {', '.join(new)} add up to"
+    if not others and not math.isclose(total, 1.0, abs_tol=TOTAL_TOLERANCE):
+        raise ParameterError(f"{names} {total:g}, but there is no other component; allowed: 1")
+    if total > 1.0 + TOTAL_TOLERANCE:
+        raise ParameterError(f"{names} {total:g}; allowed: up to 1")
+    left, rest = sum(body.mass_fraction for body in others), max(0.0, 1.0 - total)
+
+    def share(body: Body) -> float:
+        if body.name in new:
+            return new[body.name]
+        return body.mass_fraction * (rest / left) if left > 0 else rest / len(others)
+
+    return tuple(dataclasses.replace(body, mass_fraction=share(body)) for body in bodies)
 
 
 def with_densities(bodies: tuple[Body, ...], materials: tuple[Material, ...]) -> tuple[Body, ...]:
@@ -190,21 +207,6 @@ def counts(bodies: tuple[Body, ...], mass: float) -> tuple[int, ...]:
     for k in by_remainder[: total - sum(whole)]:
         whole[k] += 1
     return tuple(max(n, 1) if body.mass_fraction > 0 else 0 for n, body in zip(whole, bodies, strict=True))
-
-
-def _with_fraction(bodies: tuple[Body, ...], name: str, new: float) -> tuple[Body, ...]:
-    """``bodies`` with one share replaced; the others scale to the rest, or share it equally if all are zero."""
-    if len(bodies) == 1 and not math.isclose(new, 1.0, abs_tol=TOTAL_TOLERANCE):
-        raise ParameterError(f"body.{name}.mass_fraction: {new:g}, but there is no other component; allowed: 1")
-    others = sum(body.mass_fraction for body in bodies if body.name != name)
-    rest = 1.0 - new
-
-    def share(body: Body) -> float:
-        if body.name == name:
-            return new
-        return body.mass_fraction * (rest / others) if others > 0 else rest / (len(bodies) - 1)
-
-    return tuple(dataclasses.replace(body, mass_fraction=share(body)) for body in bodies)
 
 
 def _with_size(body: Body, key: str, new: Any) -> Body:

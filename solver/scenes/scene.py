@@ -26,7 +26,7 @@ from typing import Any, cast
 from solver.effects import EFFECTS, Effect, SetUpEffect, set_up_effects
 from solver.params import Parameter, ParameterError, declared
 from solver.rigs import BENCH_RIGS, RIGS, Funnel, PourRig, Rig
-from solver.scenes.body import SPHERES, Body, body_parameters, counts, with_body_value, with_densities
+from solver.scenes.body import SPHERES, Body, body_parameters, counts, with_body_value, with_densities, with_fractions
 from solver.scenes.contact_model import ContactModel
 from solver.scenes.insertion import Insertion
 from solver.scenes.material import Material, Pair
@@ -188,11 +188,18 @@ def values(scene: Scene) -> dict[str, Any]:
 def with_values(scene: Scene, values: dict[str, Any]) -> Scene:
     """``scene`` with parameters replaced; each value is checked against its range, and the result as a whole.
 
-    A mass fraction that is set scales the other fractions so that they add up to one.
+    Mass fractions that are not set scale so that all add up to one.
     """
+    fractions: dict[str, float] = {}
     for path, raw in values.items():
         parameter = _parameter(scene, path)
-        scene = _with_value(scene, parameter.path.split("."), parameter.check(raw))
+        kind, *rest = parameter.path.split(".")
+        if kind == "body" and rest[-1] == "mass_fraction":
+            fractions[rest[0]] = float(parameter.check(raw))
+        else:
+            scene = _with_value(scene, [kind, *rest], parameter.check(raw))
+    if fractions:
+        scene = dataclasses.replace(scene, bodies=with_fractions(scene.bodies, fractions))
     check(scene)
     return scene
 
@@ -231,6 +238,11 @@ def check(scene: Scene) -> None:
             raise ParameterError(
                 f"numerics.max_time: {scene.numerics.max_time:g} s is not longer than the {rig.running_time:g} s for "
                 f"which the {rig.name} runs; raise it, turn faster, or turn fewer times"
+            )
+        if (acting := max((one.after for one in rig.actions()), default=0.0)) >= scene.numerics.max_time:
+            raise ParameterError(
+                f"numerics.max_time: {scene.numerics.max_time:g} s is not longer than the {acting:g} s that the "
+                f"{rig.name} takes to act; raise it, or let the rig act faster"
             )
         _check_duration(rig, scene.numerics)
         rig.feed().check(scene.insertion.region_radius, longest)

@@ -1,5 +1,7 @@
 """Runs left out of a finished study: the refit, the file beside the result, the table, and what the board says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -21,9 +23,7 @@ def result():
 
 def left_out(result, count):
     """The first runs of the surface, one of each setting."""
-    return [ExcludedRun(runs[0].label, runs[0].experiment, runs[0].seed, "spilled") for runs in result.surface.runs][
-        :count
-    ]
+    return [ExcludedRun.of(runs[0], "spilled") for runs in result.surface.runs[:count]]
 
 
 @pytest.mark.parametrize("case", list(CASES))
@@ -47,8 +47,17 @@ def test_without_a_run_the_answer_is_that_of_the_model_of_the_others(result):
     assert optimum_without(result, excluded).values != result.optimum.values
 
 
+def test_another_pour_with_the_same_seed_is_not_left_out(result):
+    """Continued with other ranges, "point 1" is another scene, though its seeds are the same."""
+    excluded = left_out(result, 1)
+    row = tuple(replace(run, key=f"other {run.key}") for run in result.surface.runs[0])
+    other = replace(result, surface=replace(result.surface, runs=(row, *result.surface.runs[1:])))
+    assert optimum_without(other, excluded).values == other.optimum.values
+    assert optimum_without(result, excluded).values != result.optimum.values
+
+
 def test_without_any_run_there_is_no_model(result):
-    every = [ExcludedRun(run.label, run.experiment, run.seed, "all") for row in result.surface.runs for run in row]
+    every = [ExcludedRun.of(run, "all") for row in result.surface.runs for run in row]
     with pytest.raises(StatisticsError):
         optimum_without(result, every)
     tables = {one.title: one.table for one in study_board(result, None, excluded=every).tables}
@@ -57,23 +66,25 @@ def test_without_any_run_there_is_no_model(result):
 
 def test_what_is_left_out_is_kept_with_its_reasons(result, tmp_path):
     assert load_excluded(tmp_path) == ()
-    excluded = [*left_out(result, 1), ExcludedRun(*run_of(result, 3), 'wedged; "see film", 12 ü')]
+    excluded = [*left_out(result, 1), ExcludedRun.of(result.surface.runs[3][0], 'wedged; "see film", 12 ü')]
     keep_excluded(tmp_path, result, excluded)
     assert list(load_excluded(tmp_path)) == excluded
     with pytest.raises(CommandError, match="no run of the response surface"):
-        keep_excluded(tmp_path, result, [ExcludedRun("point 1", "", -1, "x")])
+        keep_excluded(tmp_path, result, [ExcludedRun("point 1", "", -1, "k", "x")])
     assert list(load_excluded(tmp_path)) == excluded
     keep_excluded(tmp_path, result, [])
     assert load_excluded(tmp_path) == ()
 
 
-def run_of(result, row):
-    run = result.surface.runs[row][0]
-    return run.label, run.experiment, run.seed
-
-
 @pytest.mark.parametrize(
-    "text", ["", "a,b\n", "label,experiment,seed,reason\np,,one,x\n", "label,experiment,seed,reason\np,,1,\n"]
+    "text",
+    [
+        "",
+        "a,b\n",
+        "label,experiment,seed,reason\np,,1,x\n",
+        "label,experiment,seed,key,reason\np,,one,k,x\n",
+        "label,experiment,seed,key,reason\np,,1,k,\n",
+    ],
 )
 def test_a_file_of_another_kind_is_refused_in_a_line(tmp_path, text):
     (tmp_path / FILE).write_text(text)

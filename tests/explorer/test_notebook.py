@@ -221,7 +221,7 @@ def test_a_sweep_is_the_grid_in_order_and_every_row_a_pour(swept, scene, taichi)
 
 
 def test_mass_fractions_of_a_sweep_are_those_that_are_poured(scene, monkeypatch, tmp_path):
-    """A fraction that is set scales the others, those set before it too."""
+    """Fractions that are set stay as they are, and scale the others."""
     fractions = {"body.seed.mass_fraction": [0.5], "body.plate.mass_fraction": [0.3]}
     queued = []
     monkeypatch.setattr(WorkerPool, "run_queue", lambda self, queue, room: queued.extend(queue) or [])
@@ -230,7 +230,8 @@ def test_mass_fractions_of_a_sweep_are_those_that_are_poured(scene, monkeypatch,
     changed = with_values(scene, {path: one for path, (one,) in fractions.items()})
     assert [job.scene for job in queued] == [changed]
     assert sum(value(changed, f"body.{body.name}.mass_fraction") for body in scene.bodies) == pytest.approx(1.0)
-    assert value(changed, "body.seed.mass_fraction") != 0.5
+    shares = [value(changed, f"body.{name}.mass_fraction") for name in ("seed", "plate", "petiole")]
+    assert shares == pytest.approx([0.5, 0.3, 0.2])
 
 
 def test_what_is_in_the_store_is_not_poured_again(swept, scene, monkeypatch):

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from doe.analysis.screening import SIGNIFICANT
+from doe.analysis.surface_anova import ratio
 from doe.analysis.t_tests import Sample
 from doe.analysis.verification import Verification
 from doe.stages.screening import ScreeningResult
@@ -206,7 +207,7 @@ def precision_cautions(target: Target, test: Verification) -> list[str]:
     found = []
     error, spread = test.relative_error_percent, test.simulated.standard_error
     name = observable_label(target.observable)
-    if error < 100 * spread / abs(target.mean):
+    if target.mean != 0.0 and error < 100 * spread / abs(target.mean):
         found.append(
             f"{name[0].upper()}{name[1:]}: the relative error of {fixed(error)} % is smaller than the standard error "
             f"of the simulated mean, {observed(target.observable, spread)} = "
@@ -229,12 +230,13 @@ def _facts(result: StudyResult) -> list[tuple[str, str]]:
         for one in settings(result.optimum)
     ]
     several = len(study.targets) > 1
+    grams = "" if profile.mass is None else f"{number(1e3 * profile.mass)} g, "
     named = [(target, f" ({observable_label(target.observable)})" if several else "") for target in study.targets]
     outcomes = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in sorted(totals.by_outcome.items()))
     return [
         (
             "Study",
-            f"{code(study.name)}, profile {profile.name}: {number(1e3 * profile.mass)} g, {profile.spheres} shapes",
+            f"{code(study.name)}, profile {profile.name}: {grams}{profile.spheres} shapes",
         ),
         ("Runs", f"{totals.total} pours: {outcomes}; {percent(1 - totals.valid / totals.total, 1)} not valid"),
         *((f"Noise of one pour{of}", _noise(result, target)) for target, of in named),
@@ -399,7 +401,7 @@ def _samples(target: Target, test: Verification) -> Table:
             spread += f" ({target.sd_source})"
         error = observed(name, sample.standard_error)
         rows.append((words, observed(name, sample.mean), spread, str(sample.n or MISSING), error))
-    share = 100 * test.simulated.standard_error / abs(target.mean)
+    share = 100 * ratio(test.simulated.standard_error, abs(target.mean))
     caption = (
         f"Relative error {fixed(test.relative_error_percent)} %; standard error of the simulated mean "
         f"{fixed(share)} % of the target."

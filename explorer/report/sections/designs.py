@@ -281,7 +281,7 @@ def row_table(part: ScreeningResult) -> Table:
     rows = []
     for k, (levels, runs, lost) in enumerate(zip(part.design, part.runs, part.no_pile_share, strict=True)):
         sample = sample_of(runs, part.response)
-        signs = "".join("+" if level > 0 else "−" for level in levels)
+        signs = "".join("+" if level > 0 else "−" if level < 0 else "0" for level in levels)
         rows.append(
             (
                 str(k + 1),

@@ -67,7 +67,8 @@ def _beside_photographs(result: AnyStudy, photographed: PhotographedTarget | Non
         return {}
     outlines, behind = photographed.outlines, photographed.backdrop
     caption = outlines_caption(result.piles, len(outlines)) + (f" Behind: {behind.name}." if behind else "")
-    caption += f" {number(1e3 * result.study.profile.mass)} g were poured; sizes compare with a pile of that mass only."
+    if (mass := result.study.profile.mass) is not None:
+        caption += f" {number(1e3 * mass)} g were poured; sizes compare with a pile of that mass only."
     return {PHOTOGRAPHED: Plot(partial(pile_outlines, result.piles, outlines, behind), caption, 0.6)}
 
 

@@ -95,5 +95,5 @@ def excluded_runs(result: StudyResult, sent: Sequence[object]) -> list[ExcludedR
     for run, row in zip(runs, rows_in_order(sent, len(runs), "the runs of the study"), strict=True):
         reason = entered_text(row.get(REASON), f"{run.title}, seed {run.seed}")
         if reason:
-            excluded.append(ExcludedRun(run.label, run.experiment, run.seed, reason))
+            excluded.append(ExcludedRun.of(run, reason))
     return excluded

@@ -33,6 +33,24 @@ def test_a_profile_sets_shapes_and_mass():
         with_profile(study, "huge")
 
 
+def test_without_a_mass_in_the_profile_the_rig_s_is_poured():
+    study = study_with(lambda t: (t["rig"].update(mass="100g"), t["profile"]["quick"].pop("mass")))
+    sized, profile = with_profile(study, "quick")
+    assert value(sized.scene, "rig.mass") == profile.mass == 0.1
+    study = study_with(lambda t: t.pop("profile"))
+    assert with_profile(study, "standard")[1].mass == value(study.scene, "rig.mass")
+
+
+def test_what_is_assumed_is_what_is_poured():
+    study = study_with(lambda t: t["assumption"][0].update(reference=t["assumption"][0]["high"]))
+    one = study.assumptions[0]
+    assert value(study.scene, one.path) == one.reference == one.high
+    assert value(load_study("sunflower_extract").scene, one.path) != one.high
+    sized, profile = with_profile(load_study("sunflower_extract"), "quick")
+    shapes = next(one for one in sized.assumptions if one.path == "body.spheres")
+    assert shapes.reference == profile.spheres == sized.scene.bodies[0].spheres == "coarse"
+
+
 def test_a_named_level_is_used_as_it_stands():
     resolution = next(a for a in load_study("sunflower_extract").assumptions if a.path == "body.spheres")
     assert (resolution.level(-1), resolution.level(1)) == ("coarse", "standard")
@@ -65,7 +83,15 @@ def test_bodies_touched_by_a_factor(path, bodies):
         (lambda t: t.update(target=[]), r"\[\[target\]\]"),
         (lambda t: t["target"][0].pop("mean"), r"target\.mean: missing"),
         (lambda t: t["target"][0].update(margin=0.0), "margin: 0; allowed: more than 0"),
+        (
+            lambda t: t["target"].append({"observable": "apex_height_m", "mean": 0.03}),
+            r"target\.margin: missing for apex_height_m; only an angle has a default, 2°",
+        ),
         (lambda t: t["factor"][3].update(low="90MPa"), "not below"),
+        (
+            lambda t: t["factor"][3].update(path="body.plate.mass_fraction", low=0.1, high=0.3, reference=0.14),
+            r"factor\.path: mass fractions of plate, seed, up to 1\.\d+ together; allowed: up to 1, with",
+        ),
         (lambda t: t["factor"][3].update(reference="1MPa"), "reference"),
         (lambda t: t["factor"][3].update(path="material.seed.colour"), "no such parameter"),
         (lambda t: t["factor"][3].pop("high"), r"factor\.high: missing in X4"),
@@ -119,6 +145,7 @@ def test_bodies_touched_by_a_factor(path, bodies):
         (lambda t: t["change"][0].update(values=3), "values: 3; allowed: a table"),
         (lambda t: t["change"][0].update(values={}), "changes nothing"),
         (lambda t: t["change"][1].update(name=t["change"][0]["name"]), r"change\.name: .* appears twice"),
+        (lambda t: t["change"][1].update(name="reference"), r"change\.name: 'reference' .* is that of the reference"),
         (lambda t: t["scan"].pop("path"), r"scan\.path: missing"),
         (lambda t: t["scan"].pop("values"), r"scan\.values: missing"),
         (lambda t: t["scan"].update(path="body.spheres", values=["coarse"]), "a list of numbers"),
@@ -162,7 +189,7 @@ def test_what_an_earlier_model_gave_may_be_no_measured_value():
 
 
 def test_the_observables_of_targets_are_always_among_the_estimators():
-    density = {"observable": "bulk_density_kg_m3", "mean": 200.0}
+    density = {"observable": "bulk_density_kg_m3", "mean": 200.0, "margin": 5.0}
     study = study_with(lambda t: (t["target"].append(density), t.update(estimators=["angle_of_repose_cone_deg"])))
     assert study.estimators == ("angle_of_repose_deg", "bulk_density_kg_m3", "angle_of_repose_cone_deg")
 

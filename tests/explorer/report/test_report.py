@@ -2,6 +2,7 @@
 
 import copy
 import csv
+import dataclasses
 import io
 import json
 import math
@@ -16,7 +17,9 @@ from explorer.report import report_html, report_markdown, write_report
 from explorer.report.content import Figure, Folded, Table
 from explorer.report.html import embedded
 from explorer.report.sections import sections_of
+from explorer.report.sections.designs import row_table
 from explorer.report.sections.surface import equation
+from explorer.study.for_ci import errors, summary
 from explorer.units import p_value
 from solver import asset_path
 from tests.explorer.reported_studies import CASES, HOSTILE, result_of_case, table, typed, visible
@@ -79,6 +82,26 @@ def test_no_missing_number_leaks_into_the_text(result):
     for text in (visible(report_html(typed(result))), report_markdown(typed(result))):
         assert not re.search(r"\b(nan|NaN|None|inf|null|undefined|True|False)\b", text)
         assert "{" not in text
+
+
+def test_a_target_of_zero_has_no_relative_error(studies):
+    result = copy.deepcopy(studies["two targets"])
+    for target in (result["study"]["targets"][1], result["verification"]["targets"][1]):
+        target["mean"] = 0.0
+    result["verification"]["tests"][1]["relative_error_percent"] = None
+    found = typed(result)
+    texts = [visible(report_html(found)), report_markdown(found), found.verification.line, summary(found, ())]
+    assert not any(re.search(r"\b(nan|inf)\b", text, re.IGNORECASE) for text in texts)
+    assert [one.fault(5.0) for one in errors(found)][1].endswith("cannot be told: the target is 0, or no pour is valid")
+
+
+def test_middle_levels_of_a_screening_are_no_low_ones(studies):
+    screening = typed(studies["planted"]).screening
+    design = screening.design.copy()
+    design[0] = 0.0
+    levels = [row[1] for row in row_table(dataclasses.replace(screening, design=design)).rows]
+    assert levels[0] == f"`{'0' * design.shape[1]}`"
+    assert set(levels[1]) == set("`+−")
 
 
 def test_page_loads_nothing_from_elsewhere(result):

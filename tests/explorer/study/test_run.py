@@ -159,6 +159,19 @@ def test_a_study_that_cannot_be_analysed_ends_in_one_line(tmp_path, monkeypatch)
     assert not (tmp_path / "out" / "result.json").exists()
 
 
+@pytest.mark.usefixtures("formula")
+def test_a_folder_goes_on_with_the_profile_it_was_begun_with(tmp_path):
+    assert calibrate(tmp_path).exit_code == 0
+    before = (tmp_path / "out" / "result.json").read_bytes()
+    refused = calibrate(tmp_path, "--profile", "standard", "--resume")
+    assert refused.exit_code == 2
+    assert refused.stderr == (
+        f"error: --out {tmp_path / 'out'}: holds the profile quick of sunflower_extract, not standard; name another "
+        "folder, or continue with --profile quick\n"
+    )
+    assert (tmp_path / "out" / "result.json").read_bytes() == before
+
+
 def test_a_target_out_of_reach_stops_a_study_unless_it_is_told_to_go_on(tmp_path, monkeypatch):
     class Flat(Formula):
         def _once(self, stage, row, setting, replicate, attempt):

@@ -33,6 +33,15 @@ def test_bodies_come_at_the_rate_of_the_feed():
     assert supply.overdue(next_time + 1.1, 1.0)
 
 
+def test_a_feed_that_lags_behind_its_rate_is_not_full_while_bodies_find_a_place():
+    """All are due within 0.3 s; the last of those that came in found its place at 5 s."""
+    supply, _ = fed()
+    supply.entries[-1] = supply.entries[-1]._replace(time=5.0)
+    assert supply.missing > 0
+    assert not supply.overdue(5.9, 1.0)
+    assert supply.overdue(6.1, 1.0)
+
+
 def test_a_seed_repeats_sizes_order_and_places():
     (one, _), (two, _), (other, _) = fed(3), fed(3), fed(4)
     np.testing.assert_array_equal(one.order, two.order)

@@ -13,7 +13,7 @@ ALONE, HOLDING = Obstruction("petiole", 0.4e-3, 0.0), Obstruction("petiole", 0.4
 WEDGED = Obstruction("petiole", 0.4e-3, 0.0, 0.04)
 
 
-def judged(rig, hanging, in_rig, discharged=0.02, across=None, blocked=False, stalled=True):
+def judged(rig, hanging, in_rig, discharged=0.02, across=None, blocked=False, stalled=True, waiting=0):
     """Outcome and message of a quiet pour of 30 g."""
     moment = Moment(
         time=2.0,
@@ -28,6 +28,7 @@ def judged(rig, hanging, in_rig, discharged=0.02, across=None, blocked=False, st
         room=100,
         poured_mass=0.03,
         across=across,
+        waiting=waiting,
     )
     return verdict(RIGS[rig](), Numerics(), moment)
 
@@ -80,6 +81,10 @@ def test_what_stays_in_a_box_is_its_result_unless_nothing_passes_or_a_body_lies_
     assert judged("draw_down_box", 90, 0.03, discharged=0.0) == jammed
     assert judged("draw_down_box", 40, 0.01, across=ALONE) == (Outcome.AT_REST, "")
     assert judged("draw_down_box", 40, 0.01, across=HOLDING)[0] == Outcome.OBSTRUCTED
+    # Some have come out, then the others formed an arch.
+    arch = (Outcome.JAMMED, "25 bodies stay over the outlet of the draw down box")
+    assert judged("draw_down_box", 90, 0.029, discharged=0.001, waiting=25) == arch
+    assert judged("draw_down_box", 40, 0.01, waiting=1) == (Outcome.AT_REST, "")
 
 
 def test_a_rig_that_still_lets_something_out_is_not_judged():

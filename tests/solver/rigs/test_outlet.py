@@ -10,7 +10,7 @@ from solver.pours.pour import Pour
 from solver.pours.raw_pour import packed, unpacked
 from solver.pours.record import Bodies, Outcome, Spheres
 from solver.pours.run import capacity_for
-from solver.rigs.outlet import RoundOutlet, Slot, obstruction
+from solver.rigs.outlet import RoundOutlet, Slot, obstruction, waiting
 from solver.scenes.body import Members
 from solver.scenes.scene import with_values
 from tests.solver.pours.test_pour import COARSE
@@ -97,6 +97,29 @@ def test_over_a_slot_the_way_across_counts_and_what_lies_beside_it_belongs_there
     across = found(*placed((LEVEL, (1.0, 0.0, 0.0)), above=[over, beside]), outlet=SLOT, keeps=True)
     assert across.above == pytest.approx(1e-3)
     assert found(*placed((LEVEL, (0.0, 1.0, 0.0)), above=[over]), outlet=SLOT, keeps=True) is None
+
+
+def test_what_lies_beside_a_slot_is_no_arch_under_the_body_across_it():
+    raised, above = (0.0, 0.0, HEIGHT + 0.009), (0.0, 0.0, HEIGHT + 0.02)
+    beside = (0.08, 0.0, HEIGHT + 0.003)
+    across = found(*placed((raised, (1.0, 0.0, 0.0)), above=[above, beside]), outlet=SLOT, keeps=True)
+    assert (across.component, across.above) == ("stick", pytest.approx(1e-3))
+
+
+def test_the_height_over_a_slot_is_that_above_its_edge():
+    """The container ends 45 mm below the edge."""
+    middle = (0.0, 0.0, HEIGHT + 0.045 + 0.003)
+    assert found(*placed((middle, (1.0, 0.0, 0.0))), outlet=Slot(HALF, 0.045), keeps=True).height == 0.0
+    wedged = found(*placed(((0.0, 0.0, HEIGHT + 0.085), (1.0, 0.0, 0.0))), outlet=Slot(HALF, 0.045), keeps=True)
+    assert wedged.height == pytest.approx(0.04 - 2.7e-3)
+
+
+def test_bodies_over_the_outlet_wait_there_and_those_beside_it_do_not():
+    bodies, _ = placed(above=[(0.0, 0.03, HEIGHT + 0.02), (0.02, 0.0, HEIGHT + 0.02), (0.0, 0.0, HEIGHT - 0.02)])
+    held = bodies.position[:, 2] > HEIGHT
+    assert [waiting(outlet, HEIGHT, bodies, held) for outlet in (SLOT, ROUND)] == [1, 0]
+    # A heap below that reaches into a deep slot, but not to its edge, keeps nothing back.
+    assert waiting(Slot(HALF, 0.03), HEIGHT, bodies, held) == 0
 
 
 BALL = Members(((0.0, 0.0, 0.0),), (13.5e-3,), 1e-3, (7.3e-8,) * 3)

@@ -109,6 +109,7 @@ def test_choosing_a_rig_again_keeps_its_settings():
         ({"rig": {"name": "compression", "body": "wheat"}}, ["rig.body", "wheat", "bead"]),
         ({"rig": {"name": "compression"}, "insertion": {"rate": 1}}, ["insertion.rate"]),
         ({"rig": {"name": "rotating_drum", "speed_rpm": 1}}, ["numerics.max_time", "60 s", "90 s"]),
+        ({"rig": {"name": "lifting_cylinder", "lift_speed": "4mm/s"}}, ["numerics.max_time", "30 s", "37.5 s"]),
         ({"rig": 3}, ["rig", "table"]),
         ({"numerics": {"skim": 1}}, ["numerics.skim", "numerics.skin"]),
     ],

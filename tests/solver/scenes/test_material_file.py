@@ -2,12 +2,13 @@
 
 import copy
 import dataclasses
+import math
 import tomllib
 
 import pytest
 
 from solver.assets import asset_path
-from solver.params import ParameterError, parse_quantity
+from solver.params import Parameter, ParameterError, parse_quantity
 from solver.scenes.body import counts
 from solver.scenes.material_file import load_material, scene_from
 from solver.scenes.scene import canonical, parameters, value, with_rig, with_values
@@ -140,6 +141,21 @@ def test_two_elastic_constants_give_the_third(scene):
     assert steel.shear_modulus == pytest.approx(2.0e11 / 2.6)
 
 
+def test_a_computed_level_that_misses_a_limit_by_rounding_is_the_limit(scene):
+    """0.05 of a coefficient of restitution is its least: a walk from 0.175 + 0.125 x ends a rounding error below."""
+    path = "pair.seed.seed.restitution"
+    below = (0.05 + 0.30) / 2 - 1.0 * (0.30 - 0.05) / 2
+    assert below < 0.05
+    assert value(with_values(scene, {path: below}), path) == 0.05
+    with pytest.raises(ParameterError, match=r"0\.0499999 is outside 0\.05 … 1"):
+        with_values(scene, {path: 0.0499999})
+    # Without an upper limit nothing is rounded.
+    size = Parameter("rig.size", "m", 0.0, math.inf, "Size.")
+    assert size.check(1e-300) == 1e-300
+    with pytest.raises(ParameterError):
+        size.check(-1e-300)
+
+
 def test_counts_are_the_largest_remainder_and_the_same_for_every_seed(scene):
     # By hand: 0.78·30/0.34552 = 67.7, 0.14·30/1.40383 = 2.99, 0.08·30/0.4283 = 5.60 → total 76.3 → 76 bodies;
     # quotas 67.46, 2.98, 5.58 → whole 67, 2, 5, the two largest remainders are those of plate and petiole.
@@ -157,6 +173,19 @@ def test_the_rest_goes_to_the_others_though_they_had_none(scene):
     assert [body.mass_fraction for body in alone.bodies] == [1.0, 0.0, 0.0]
     again = with_values(alone, {"body.seed.mass_fraction": 0.6})
     assert [body.mass_fraction for body in again.bodies] == pytest.approx([0.6, 0.2, 0.2])
+
+
+def test_fractions_that_are_set_together_stay_as_they_are(scene):
+    fractions = {"body.seed.mass_fraction": 0.86, "body.petiole.mass_fraction": 0.10}
+    for order in (fractions, dict(reversed(fractions.items()))):
+        bodies = with_values(scene, order).bodies
+        assert [body.mass_fraction for body in bodies] == pytest.approx([0.86, 0.04, 0.10])
+    every = {"body.seed.mass_fraction": 0.5, "body.plate.mass_fraction": 0.3, "body.petiole.mass_fraction": 0.2}
+    assert [body.mass_fraction for body in with_values(scene, every).bodies] == [0.5, 0.3, 0.2]
+    with pytest.raises(ParameterError, match=r"seed, plate, petiole add up to 1\.1, but there is no other component"):
+        with_values(scene, every | {"body.seed.mass_fraction": 0.6})
+    with pytest.raises(ParameterError, match=r"mass_fraction: seed, petiole add up to 1\.06; allowed: up to 1"):
+        with_values(scene, fractions | {"body.petiole.mass_fraction": 0.2})
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5])
