@@ -82,8 +82,11 @@ def find_place(
 ) -> Pose | None:
     """A random pose above the opening of ``feed`` that touches nothing, or None.
 
-    The orientation is drawn once and kept, and places are tried for it, so that orientations that are harder to place
-    are not rarer. ``occupied_centres`` (n, 3) and ``occupied_radii`` (n,) are the member spheres already there [m].
+    The orientation is drawn once, and places are tried for it, so that orientations that are harder to place are hardly
+    rarer. Only one for which no place is found is drawn anew when the body is next tried: long bodies in a rig that is
+    hardly wider then enter somewhat more upright (petioles of 58 mm in a cylinder of 60 mm: mean |cos| to the vertical
+    0.56 in place of 0.5; in the default funnel no body, in the default cylinder one of 763 is drawn anew).
+    ``occupied_centres`` (n, 3) and ``occupied_radii`` (n,) are the member spheres already there [m].
     """
     quaternion = random_quaternion(rng)
     offsets = turned(clump.centres, quaternion)
