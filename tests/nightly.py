@@ -38,7 +38,13 @@ class Part:
 
 PARTS = {
     "solver": Part((*BOTH_CORES, "loadfile", "tests/solver", "--ignore=tests/solver/photograph")),
-    "photographs": Part((*BOTH_CORES, "load", "tests/solver/photograph")),
+    "photographs": Part(
+        (*SLOW, "tests/solver/photograph/test_campaign.py", "tests/solver/photograph/test_drum.py", "-k", "few or size")
+    ),
+    "photographs, 120 pictures and 400 outlines": Part(
+        (*BOTH_CORES, "load", "tests/solver/photograph/test_campaign.py", "tests/solver/photograph/test_coverage.py"),
+        nightly=False,
+    ),
     "exports and laboratory": Part((*SLOW, "tests/explorer/export/test_paraview.py", "tests/explorer/laboratory")),
     "validation campaign, small": Part((*SLOW, "tests/doe/validation")),
     "other engines, short": Part((*PYTEST, "-m", "slow or not slow", "tests/peers/test_short_pour.py")),
@@ -55,7 +61,10 @@ PARTS = {
     "page speed": Part((sys.executable, "-m", "tests.browser.page_speed")),
     "documents": Part((*SLOW, "tests/test_readme.py", "-k", "as_they_are_written")),
     "README, whole": Part((*SLOW, "tests/test_readme.py", "-k", "to_their_ends"), nightly=False),
-    "a study killed 20 times": Part((sys.executable, "-m", "tests.faults.kills", "study", "--kills", "20")),
+    "a study killed 7 times": Part((sys.executable, "-m", "tests.faults.kills", "study", "--kills", "7")),
+    "a study killed 20 times": Part(
+        (sys.executable, "-m", "tests.faults.kills", "study", "--kills", "20"), nightly=False
+    ),
     "fuzzing": Part((sys.executable, "-m", "tests.faults.fuzz", "--inputs", "100")),
     "a diagnosis killed 10 times": Part(
         (sys.executable, "-m", "tests.faults.kills", "diagnosis", "--kills", "10"), nightly=False
@@ -63,7 +72,8 @@ PARTS = {
     "a page killed 10 times": Part(
         (sys.executable, "-m", "tests.faults.kills", "page", "--kills", "10"), nightly=False
     ),
-    "memory over 10,000 pours": Part((sys.executable, "-m", "tests.faults.memory", "--pours", "10000")),
+    "memory over 2,000 pours": Part((sys.executable, "-m", "tests.faults.memory", "--pours", "2000")),
+    "memory over 10,000 pours": Part((sys.executable, "-m", "tests.faults.memory", "--pours", "10000"), nightly=False),
     "trefoils": Part((*SLOW, "tests/explorer/diagnosis/test_trefoils.py"), nightly=False),
     "other engines, 18 pours each": Part((*SLOW, "-s", "tests/peers/test_same_pile.py"), nightly=False),
     "benchmark": Part(
