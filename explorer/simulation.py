@@ -41,8 +41,8 @@ class SimulateOrder:
     material: str | None = None
     settings: tuple[str, ...] = ()
     """``path=value``, in order."""
-    seed: int = 1
-    """Of the first pour; the others follow one by one."""
+    seed: int | None = None
+    """Of the first pour, the others follow one by one; None: 1, or that of an interrupted pour."""
     replicates: int = 1
     threads: int | None = None
     scheduler: str = ""
@@ -89,7 +89,9 @@ def simulation_of(order: SimulateOrder, events: bool = False) -> Simulation:
     if order.checkpoint and not order.checkpoint.absolute().parent.is_dir():
         raise CommandError(f"--checkpoint: {order.checkpoint}: no folder {order.checkpoint.absolute().parent}")
     scene = with_settings(load_scene(order.source, order.material), order.settings)
-    first = interrupted.seed if interrupted else order.seed
+    first = interrupted.seed if interrupted else 1 if order.seed is None else order.seed
+    if order.seed not in (None, first):
+        raise CommandError(f"--seed {order.seed}: the interrupted pour has the seed {first}; leave out --seed")
     found = Simulation(scene, range(first, first + order.replicates), interrupted)
     of_pours = order.watched or order.resume or order.replicates > 1 or events or order.scheduler
     if found.is_bench_test and of_pours:

@@ -146,7 +146,7 @@ def _columns(points: list[Reading]) -> tuple[tuple[float, ...], tuple[float, ...
 
 def poisson_ratios(young: tuple[Derived, ...], shear: tuple[Derived, ...]) -> tuple[Estimate, ...]:
     """ν of every component that stands in both."""
-    by_component = {one.of: one for one in young}
+    by_component = {one.of: one for one in young if one.name == "youngs_modulus"}
     return tuple(_poisson_ratio(by_component[one.of], one) for one in shear if one.of in by_component)
 
 

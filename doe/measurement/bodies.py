@@ -186,7 +186,7 @@ def read_bodies(path: Path, scene: Scene) -> tuple[MeasuredBody, ...]:
     rows: dict[tuple[str, str], MeasuredBody] = {}
     for line, cells in table.rows[1:]:
         try:
-            row = _row(cells, scene)
+            row = _row([*cells[:3], *map(table.plain, cells[3:])], scene)
             if (row.body, row.quantity) in rows:
                 raise MeasurementError(f"{row.quantity} of {row.body}: appears twice; allowed: once")
         except (ParameterError, MeasurementError) as error:

@@ -157,8 +157,8 @@ def _observation(
 
 
 def _has_spread(observation: Observation) -> bool:
-    """True if at least two replicates have a value, or the uncertainty of a single value is stated."""
-    return observation.uncertainty is not None or sum(_measured(observation.values)) >= 2
+    """True if at least two replicates have a value, or one has and its uncertainty is stated."""
+    return sum(_measured(observation.values)) >= (2 if observation.uncertainty is None else 1)
 
 
 def _measured(values: Array) -> Iterator[bool]:

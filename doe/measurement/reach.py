@@ -109,6 +109,7 @@ def _resolution(name: str, unit: str, values: np.typing.NDArray[np.float64], sta
         sd = float(measured.std(ddof=1))
         error = sd / np.sqrt(n)
         return SummaryResolution(name, unit, n, mean, sd, float(error), float(stats.t.ppf(0.975, n - 1) * error))
+    stated = stated if n else float("nan")
     return SummaryResolution(name, unit, n, mean, stated, stated, float(stats.norm.ppf(0.975)) * stated)
 
 

@@ -45,6 +45,8 @@ FEWEST = 200
 PLATE_SHARE, PLATE_DEPTH = 0.2, 0.05
 """Share of the points that must lie on the bare plate for it to be found, and how far from it they may lie, as a
 share of the scan's height."""
+NEIGHBOURS, REGULAR = 4, 1.05
+"""Points next to one on a square grid, and how much farther than the nearest the last of them may be, in a grid."""
 ROUNDS = 30
 
 
@@ -211,10 +213,19 @@ def found_plate(points: Array) -> tuple[float, float, float]:
 
 
 def spacing(points: Array) -> float:
-    """Return the median distance in the plane of a point to its nearest neighbour [m], over about a thousand points."""
+    """Return the width of the cells [m] in which ``points`` are read, from about a thousand of them.
+
+    Of a regular grid, where four neighbours are equally near in the plane, it is the median distance of a point to the
+    nearest. Of a cloud it is twice that to the fourth: cells as narrow as the nearest would mostly be empty, and 1 % of
+    these are (4.8 points in a cell at random places).
+    """
     some = points[:: max(1, len(points) // 1000), :2]
-    distance = cKDTree(points[:, :2]).query(some, k=2)[0][:, 1]
-    return float(np.median(distance[distance > 0.0])) if (distance > 0.0).any() else 0.0
+    distance = cKDTree(points[:, :2]).query(some, k=1 + NEIGHBOURS)[0][:, 1:]
+    distance = distance[np.isfinite(distance[:, -1]) & (distance[:, 0] > 0.0)]
+    if not len(distance):
+        return 0.0
+    nearest, fourth = float(np.median(distance[:, 0])), float(np.median(distance[:, -1]))
+    return nearest if fourth <= REGULAR * nearest else 2.0 * fourth
 
 
 def _volume_centre(points: Array, grid: float) -> Array:
@@ -281,9 +292,14 @@ def _of_table(path: Path) -> Array:
     text = decoded(path.read_bytes())
     if text is None:
         raise MeasurementError("not a text file")
-    rows = [row for line in text.splitlines() if (row := line.strip()) and not row.startswith("#")]
-    comma = "." if rows and _decimal_comma(rows[-1]) else " "
-    rows = [row.replace(",", comma).replace(";", " ") for row in rows]
+    rows = [row for line in text.splitlines() if (row := line.strip(" \r")) and row.strip() and row[0] != "#"]
+    decimal_comma = bool(rows) and _decimal_comma(rows[-1])
+    signs = ";\t" if decimal_comma else ";\t,"
+    delimiter = next((sign for sign in signs if rows and sign in rows[-1]), None)
+    # A cell may be empty: a height that the scanner did not see.
+    rows = [" ".join(cell.strip() or "nan" for cell in row.split(delimiter)) for row in rows]
+    if decimal_comma:
+        rows = [row.replace(",", ".") for row in rows]
     if rows and not _numeric(rows[0]):
         rows = rows[1:]
     try:
@@ -329,7 +345,7 @@ def _of_image(path: Path, settings: ScanSettings) -> tuple[Array, float]:
         with Image.open(path) as image:
             if image.width * image.height > MOST_POINTS:
                 raise MeasurementError(f"{image.width} × {image.height} pixels; allowed: up to {MOST_POINTS} in all")
-            if not image.mode.startswith("I"):
+            if not image.mode.startswith(("I", "F")):
                 raise MeasurementError(f"an image of mode {image.mode}; allowed: one channel of 16 or 32 bits")
             counts = np.asarray(image, dtype=np.float64)
     except Image.DecompressionBombError:

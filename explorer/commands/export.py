@@ -60,7 +60,7 @@ def export(
     from explorer.files.run_folder import appearing
     from explorer.scene.file import named_scene, with_settings
     from explorer.study.duration import large_pour_text
-    from solver import ParameterError, value, with_values
+    from solver import ParameterError, parameters, with_values
 
     if to not in EXPORTS:
         raise CommandError(f"--to {to}: not a program; allowed: {', '.join(EXPORTS)}")
@@ -77,9 +77,11 @@ def export(
     longest = scene.numerics.duration or scene.numerics.max_time
     if time is not None and time > longest and not target.goes_on:
         raise CommandError(f"--time {time:g}: the pour for --to {to} lasts {longest:g} s at most; allowed: up to that")
-    if time is not None and time < float(value(scene, "numerics.max_time")):
+    if time is not None:
         try:
-            scene = with_values(scene, {"numerics.max_time": time})
+            # A longer feed has to come to its end in the pour made here, or a deck would go on without the rest.
+            longest = min(time, parameters(scene)["numerics.max_time"].high)
+            scene = with_values(scene, {"numerics.max_time": longest})
         except ParameterError as error:
             raise CommandError(f"--time {time:g}: {error}") from None
     target.check(scene)

@@ -33,7 +33,7 @@ def simulate(
     ),
     material: str | None = RIG_MATERIAL,
     set_: list[str] = SET,
-    seed: int = typer.Option(1, min=0, help="Seed of the first pour."),
+    seed: int | None = typer.Option(None, min=0, help="Seed of the first pour; 1 by default."),
     replicates: int = typer.Option(
         1, min=1, max=10_000, metavar="N", help="Number of pours, with seeds SEED, SEED + 1, …"
     ),

@@ -48,6 +48,10 @@ def scene_of(found: Found, path: Path) -> Scene:
     bodies: dict[str, dict[str, Any]] = found.bodies or {name: {"material": name} for name in grains(found)}
     poured = list(dict.fromkeys(body["material"] for body in bodies.values()))
     wall = found.wall or next((name for name in found.materials if name not in poured), poured[-1])
+    if left := [name for name in found.materials if name not in (*poured, wall)]:
+        found.notes.append(f"materials not taken: {', '.join(left)}")
+    if not found.bodies:
+        found.notes.append(f"no bodies are named: {', '.join(poured)} are poured, and the walls are of {wall}")
     materials = {}
     for name in dict.fromkeys([*poured, wall]):
         entry, like = dict(found.materials.get(name, {})), usual["grain" if name in poured else "steel"]
@@ -84,7 +88,10 @@ def grains(found: Found) -> list[str]:
     if not found.wall:
         return names[: max(1, len(names) - 1)]
     # Where there is one material only, the wall is made of it as well.
-    return [name for name in names if name != found.wall] or names
+    # A material that meets others but never itself is a wall too.
+    meets_itself = {next(iter(pair)) for pair in found.pairs if len(pair) == 1}
+    others = [name for name in names if name != found.wall]
+    return [name for name in others if name in meets_itself] or others or names
 
 
 def restitution_of(zeta: float) -> float:

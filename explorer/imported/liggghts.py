@@ -139,7 +139,12 @@ def _template(file: Path, found: Found, name: str, style: str, rest: list[str]) 
     body: dict[str, Any] = {"material": material}
     density, radius = constant("density"), constant("radius")
     if density is not None:
-        found.materials.setdefault(material, {})["density"] = density
+        entry = found.materials.setdefault(material, {})
+        if entry.setdefault("density", density) != density:
+            raise CommandError(
+                f"{file}: {where}: density {density:g}, but that of another template of atom {material} is "
+                f"{entry['density']:g}; allowed: templates of one density, or atom types of their own"
+            )
     if style.endswith("/sphere") and radius is not None:
         body["shape"] = {"sphere": 2.0 * radius}
     tensor = [_float(file, f"{where}: inertia_tensor", text) for text in after("inertia_tensor", 6)]

@@ -29,20 +29,20 @@ def read_yade(file: Path) -> Found:
         tree = ast.parse(text)
     except SyntaxError as error:
         raise CommandError(f"{file}: line {error.lineno}: is not Python: {error.msg}") from None
-    found, names = Found(), _constants(tree)
+    found = Found()
     angles: Numbers = {}
     calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
     labels = _labels(tree)
     for call in sorted(calls, key=lambda node: (node.lineno, node.col_offset)):
         kind, words = called(call.func), _words(call)
         if kind == "FrictMat":
-            _frict_mat(file, found, angles, call, words, names, labels)
+            _frict_mat(file, found, angles, call, words, _constants(tree, call), labels)
         elif kind.endswith("Mat") and kind[:1].isupper():
             found.notes.append(f"{kind} (line {call.lineno}): only FrictMat is taken")
     if not found.materials:
         return found
     for call in calls:
-        kind, words = called(call.func), _words(call)
+        kind, words, names = called(call.func), _words(call), _constants(tree, call)
         if kind == "sphere" or kind in ("wall", "facet", "box"):
             _placed(found, kind, call, words, names)
         elif kind == "NewtonIntegrator" and isinstance(words.get("gravity"), ast.Tuple | ast.List):
@@ -53,7 +53,7 @@ def read_yade(file: Path) -> Found:
     _frictions(found, angles)
     for call in calls:
         if called(call.func).startswith("Ip2_"):
-            _functor(found, call, names)
+            _functor(found, call, _constants(tree, call))
     found.notes.append("not taken: bodies' places, geometry, engines and time step of the script")
     return found
 
@@ -63,10 +63,12 @@ def _words(call: ast.Call) -> dict[str, ast.expr]:
     return {word.arg: word.value for word in call.keywords if word.arg}
 
 
-def _constants(tree: ast.Module) -> dict[str, float]:
-    """Names that stand for one number at the top of the script."""
+def _constants(tree: ast.Module, call: ast.Call) -> dict[str, float]:
+    """Names that stand for a number where ``call`` is made: the script's assignments above it."""
     names: dict[str, float] = {}
     for node in tree.body:
+        if (node.lineno, node.col_offset) >= (call.lineno, call.col_offset):
+            break
         if isinstance(node, ast.Assign) and len(node.targets) == 1:
             target, value = node.targets[0], node.value
             pairs = [(target, value)]

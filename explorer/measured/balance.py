@@ -71,7 +71,8 @@ class BalanceCurve:
         said = f"stated, {lag:g} s, and taken off its times" if lag is not None else "not stated, nothing is taken off"
         t10, t90 = (self.share_time(share, poured) for share in (0.1, 0.9))
         between = int(((self.time > t10) & (self.time < t90)).sum())
-        few = f"; only {between} readings lie between t10 and t90" if between < FEW_STEADY else ""
+        told = between < FEW_STEADY and math.isfinite(t90)
+        few = f"; only {between} readings lie between t10 and t90" if told else ""
         return (
             f"{self.name}: {1e3 * self.total:.4g} g passed, {self.total / poured:.1%} of what is poured; "
             f"{1e3 * self.rate:.4g} g/s; a reading every {self.interval:.3g} s{few}; lag of the balance: at most "

@@ -265,6 +265,11 @@ def _balances(brought: Brought, scene: Scene, found: Readings) -> None:
             )
         found.told.append(curve.line(poured, brought.lag))
         if math.isnan(curve.share_time(0.9, poured)):
+            if not brought.starts:
+                raise CommandError(
+                    f"--balance {curve.name}: less than 90 % of {1e3 * poured:.4g} g passed, so that it has no "
+                    "duration; leave it out, or state --starts for the times and the curve that it has"
+                )
             found.told.append(f"{curve.name}: less than 90 % of it passed, so that it has no t90 and no duration")
     times = {name: [curve.share_time(share, poured) for curve in curves] for name, share in SHARES.items()}
     found.add(FLOWED, [b - a for a, b in zip(times["discharge_t10_s"], times["discharge_t90_s"], strict=True)])
@@ -342,6 +347,11 @@ def _drum(text: str, scene: Scene, found: Readings) -> None:
         raise CommandError(f"--drum {text}: holds {', '.join(of)}; allowed: one of them, FILE.csv:COMPONENT")
     by_name = {one.name: one for one in result.derived if one.of[0] == component}
     angle = by_name.get("dynamic_angle", by_name["dynamic_angle_upper"])
+    if missing := [name for name in by_name["dynamic_angle_upper"].replicates if name not in angle.replicates]:
+        raise CommandError(
+            f"--drum {text}: no lower angle in replicate {', '.join(missing)} of {component}; allowed: one in every "
+            "replicate, or in none"
+        )
     values = [math.degrees(value) for value in angle.values]
     found.add(DYNAMIC, values)
     found.sources.append(f"{DYNAMIC}: {angle.formula} of {component} in {path.name}")

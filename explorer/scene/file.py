@@ -83,6 +83,11 @@ def _file_of(source: str) -> Path:
     for kind in SHIPPED:
         if stem in shipped_assets(kind):
             return asset_path(kind, stem)
+    if is_calibration(source):
+        raise ParameterError(
+            f"{source}: the folder of a finished calibration; allowed here: a rig, a material, a set-up or a study "
+            "(`explorer export` takes such a folder, without --material)"
+        )
     if own.is_dir():
         raise ParameterError(f"{source}: the folder holds no result.json of a finished calibration")
     rigs, materials, studies, benchmarks, scenes = map(", ".join, (SOURCES, *map(shipped_assets, SHIPPED)))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from doe.laboratory.replicates import critical_deviate, deviates, most_outliers, outliers
+from doe.laboratory.replicates import critical_deviate, deviates, most_outliers, outliers, summarise
 
 ROSNER = [
     -0.25, 0.68, 0.94, 1.15, 1.20, 1.26, 1.26, 1.34, 1.38, 1.43, 1.49, 1.49, 1.55, 1.56, 1.58, 1.65, 1.69, 1.70, 1.76,
@@ -31,6 +31,14 @@ def test_grubbs_s_test_on_the_uranium_data():
     # Two-sided 5 % point for eight values, in Grubbs's own table 2.126.
     assert critical_deviate(8, 0) == pytest.approx(2.126, abs=1e-3)
     assert outliers(URANIUM) == (7,)
+
+
+@pytest.mark.parametrize("values", [[28.5, 28.5, 29.0], [7.0, 7.0, 7.0, 7.1], [1.0, 1.0, 1.0]])
+def test_two_different_values_name_no_outlier(values):
+    """Rounding makes the two equal; by Grubbs's limit the third is then an outlier at any distance."""
+    found = summarise(values)
+    assert found.outliers == ()
+    assert np.isnan(found.shapiro_p)
 
 
 def test_all_of_several_outliers_are_named():

@@ -28,6 +28,11 @@ def test_numbers_are_read_in_si(tmp_path):
     assert (spread.value, spread.deviation) == (0.05, 0.01)
 
 
+def test_a_decimal_comma_is_read(tmp_path):
+    (mass,) = load_measurement(folder(tmp_path, HEAD.replace(",", ";") + "bead;mass;g;2,2;0,02\n")).bodies
+    assert (mass.mean, mass.standard_error) == (2.2e-3, 2e-5)
+
+
 def test_without_a_table_nothing_was_measured(tmp_path):
     assert load_measurement(write(tmp_path)).bodies == ()
 

@@ -1,9 +1,14 @@
 """What data can tell before anything is simulated: counting, resolution by hand, and effects without a telltale."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from doe.measurement import load_measurement, reach_of
+from doe.measurement.measurement import Observation
+from doe.measurement.observations import _has_spread
+from doe.measurement.reach import _resolution
 from solver import EFFECTS, Telltale, all_names, named
 from solver.assets import measurement_folder
 from solver.effects.plate_tilt import PlateTilt
@@ -29,6 +34,14 @@ def test_a_single_reading_is_known_to_its_stated_uncertainty(tmp_path):
     (angle,) = reach(tmp_path, HEAD + "1,angle_of_repose_deg,,20\n", text).conditions[0].resolutions
     assert (angle.replicates, angle.sd, angle.standard_error) == (1, 0.5, 0.5)
     assert angle.half_width == pytest.approx(1.96 * 0.5, rel=1e-4)
+
+
+def test_where_nothing_was_read_a_stated_uncertainty_makes_no_number():
+    nothing = Observation("angle_of_repose_deg", "deg", None, np.array([np.nan, np.nan]), 0.5)
+    assert not _has_spread(nothing)
+    assert _has_spread(replace(nothing, values=np.array([np.nan, 21.0])))
+    assert not _has_spread(replace(nothing, values=np.array([np.nan, 21.0]), uncertainty=None))
+    assert np.isnan(_resolution("angle_of_repose_deg", "deg", nothing.values, 0.5).standard_error)
 
 
 def test_one_number_fits_exactly(tmp_path):

@@ -259,5 +259,54 @@ def test_a_scan_without_a_bare_plate_asks_for_the_plane():
         found_plate(steep)
 
 
+@pytest.mark.parametrize("jitter", [0.2, None])
+def test_points_that_are_no_grid_are_read_without_a_shift(jitter):
+    """A point per mm², jittered or at random. Cells of the nearest distance read the cone 0.3 and 1 mm too low."""
+    rng = np.random.default_rng(2)
+    n = 120
+    places = rng.uniform(-0.06, 0.06, (n * n, 2))
+    if jitter is not None:
+        axis = (np.arange(n) + 0.5) * 1e-3 - 0.06
+        places = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+        places = places + rng.normal(0.0, jitter * 1e-3, places.shape)
+    cloud = np.column_stack([places, cone(*places.T)])
+    cell = spacing(cloud)
+    assert 1.5e-3 < cell < 3e-3
+    surface = without_holes(Scan(cloud, cell, (0.0, 0.0), 0.0, 0.0).height_map(0.05, cell))
+    centre = (np.arange(len(surface.height)) + 0.5) * surface.pixel - 0.5 * len(surface.height) * surface.pixel
+    x, y = np.meshgrid(centre, centre, indexing="ij")
+    off = surface.height - cone(x, y)
+    # The flank alone: within a cell the top of the cone and its foot are rounded.
+    flank = (np.hypot(x, y) > 2.0 * cell) & (np.hypot(x, y) < BASE - 2.0 * cell)
+    assert abs(off[flank].mean()) < 0.1e-3
+
+
+def test_spacing_of_a_grid_is_that_of_its_points():
+    axis = np.arange(30) * 1e-3
+    grid = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    c, s = np.cos(0.5), np.sin(0.5)
+    for places in (grid, grid @ np.array([[c, -s], [s, c]])):
+        assert spacing(np.column_stack([places, places[:, 0] ** 2])) == pytest.approx(1e-3)
+
+
+@pytest.mark.parametrize(("between", "decimal"), [(",", "."), (";", ","), ("\t", "."), ("\t", ",")])
+def test_an_empty_cell_is_a_height_that_was_not_seen(tmp_path, between, decimal):
+    """Not that in the column after it."""
+    rows = [(f"{x}.5", f"{y}.5", "" if x == y else "0.25", "120") for x in range(20) for y in range(20)]
+    text = "".join(between.join(row).replace(".", decimal) + "\n" for row in [("x", "y", "z", "intensity"), *rows])
+    path = tmp_path / "scan.csv"
+    path.write_text(text)
+    scan = read_scan(path, ScanSettings(unit="mm", axis=(0.0, 0.0), plate=(0.0, 0.0, 0.0)))
+    assert len(scan.points) == 380
+    assert scan.points[:, 2].max() == pytest.approx(0.25e-3)
+
+
+def test_an_image_of_real_numbers_is_read(tmp_path):
+    path = tmp_path / "scan.tif"
+    Image.fromarray(np.full((20, 20), 0.5, dtype=np.float32)).save(path)
+    scan = read_scan(path, ScanSettings(pixel=1e-3, step=1e-2, axis=(0.0, 0.0), plate=(0.0, 0.0, 0.0)))
+    assert scan.points[:, 2] == pytest.approx(5e-3)
+
+
 def test_spacing_of_points_that_all_coincide_is_zero():
     assert spacing(np.zeros((300, 3))) == 0.0

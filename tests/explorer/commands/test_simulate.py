@@ -4,6 +4,8 @@ import csv
 import dataclasses
 import json
 import tomllib
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from explorer.files.run_result import simulation_result
 from explorer.recordings.recording import FRAME_INTERVAL
 from explorer.recordings.recording_reader import read_recording
 from explorer.scene.file import load_scene, with_settings
+from explorer.simulation import SimulateOrder, simulation_of
 from solver import Outcome, run_pour, run_pours
 from solver.observables import Value, observe
 from tests.explorer.command_line import TINY, explorer, refused, settings
@@ -149,6 +152,16 @@ def test_a_run_that_breaks_off_leaves_no_folder(failure, code, tmp_path, monkeyp
 
 
 @pytest.mark.usefixtures("taichi")
+def test_an_interrupted_pour_keeps_its_seed(monkeypatch):
+    monkeypatch.setattr("explorer.simulation.read_checkpoint", lambda path: SimpleNamespace(seed=3))
+    line = refused(explorer("simulate", "funnel", "--resume", "pour.npz", "--seed", 5))
+    assert line == "--seed 5: the interrupted pour has the seed 3; leave out --seed"
+    order = SimulateOrder(source="funnel", resume=Path("pour.npz"))
+    assert list(simulation_of(order).seeds) == [3]
+    assert list(simulation_of(dataclasses.replace(order, seed=3)).seeds) == [3]
+    assert list(simulation_of(dataclasses.replace(order, resume=None)).seeds) == [1]
+
+
 def test_the_recordings_of_a_run_that_is_interrupted_are_named(tmp_path, monkeypatch):
     def interrupted(jobs, **options):
         yield next(pours(jobs, **options))

@@ -119,6 +119,25 @@ def test_a_yade_script_is_read_and_not_run(tmp_path):
         assert words in said
 
 
+def test_a_variable_of_a_yade_script_has_the_value_of_its_line(tmp_path):
+    script = (
+        "phi = atan(0.5)\nFrictMat(young=1e7, density=2500, frictionAngle=phi, label='a')\n"
+        "phi = atan(0.2); FrictMat(young=1e7, density=2500, frictionAngle=phi, label='b')\n"
+        "phi = 0.0\nwall(0, axis=2, material='b')\nsphere((0, 0, 1), radius=2e-3, material='a')\n"
+    )
+    scene, _ = imported("yade", script, tmp_path, "script.py")
+    assert numbers(scene, "pair.a.a.static_friction", "pair.a.b.static_friction") == pytest.approx([0.5, 0.2])
+
+
+def test_what_meets_others_but_never_itself_is_no_grain(tmp_path):
+    """Two wall materials: one is taken, and what became of all is said."""
+    text = EDEM.replace("\n\n", "\nacrylic,0.35,1190,1200,1\n\n") + "maize,acrylic,0.5,0.3,0.04\n"
+    scene, said = imported("edem", text, tmp_path, "table.csv")
+    assert [body.material for body in scene.bodies] == ["maize"]
+    assert "materials not taken: acrylic" in said
+    assert "no bodies are named: maize are poured, and the walls are of steel" in said
+
+
 def test_edem_s_table_has_the_shear_modulus(tmp_path):
     scene, said = imported("edem", EDEM, tmp_path, "table.csv")
     maize = scene.material("maize")
@@ -247,6 +266,12 @@ def test_tables_for_edem_come_back(declared, tmp_path):
         ("liggghts", "fix a all property/global youngsModulus peratomtype v_E\n", "'v_E' is not a number"),
         ("liggghts", "fix a all property/global coefficientFriction peratomtypepair 2 1 2 3\n", "allowed: 4"),
         ("yade", "FrictMat(young=open('x').read())\n", "line 1: FrictMat(young=open('x').read()): cannot be evaluated"),
+        (
+            "liggghts",
+            LIGGGHTS
+            + "fix pts2 all particletemplate/sphere 7 atom_type 1 density constant 1200 radius constant 1e-3\n",
+            "density 1200, but that of another template of atom type1 is 2500; allowed: templates of one density",
+        ),
         ("yade", "a = = 1\n", "line 1: is not Python"),
         ("yade", "FrictMat(young=1e7, poisson=0.9)\n", "poisson_ratio"),
         (

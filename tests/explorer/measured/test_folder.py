@@ -204,6 +204,23 @@ def test_without_a_start_a_balance_gives_the_duration_alone(material, tmp_path):
     assert "no --starts: t10, t50, t90" in text
 
 
+def test_a_balance_that_misses_the_last_tenth_gives_no_duration(material, tmp_path):
+    time = np.arange(0.0, 8.0, 0.05)
+    whole, short = (
+        write_balance(tmp_path / f"{name}.csv", time, share * steady(time, 0.0))
+        for name, share in (("whole", 1.0), ("short", 0.85))
+    )
+    stated = ["--set", f"rig.mass={MASS}", "--uncertainty", "discharge_time_s=0.1"]
+    given = ["--balance", whole, "--balance", short, *stated]
+    line = refused(explorer("new", "measurement", tmp_path / "data", "--material", material, *given))
+    assert line.startswith("--balance short.csv: less than 90 % of ")
+    given += ["--uncertainty", "discharge_t90_s=0.1", "--starts", BEGINS]
+    text = new(tmp_path / "data", "--material", material, *given)
+    assert "short.csv: less than 90 % of it passed" in text
+    assert "only 0 readings" not in text
+    assert np.isnan(values(tmp_path / "data", "A", "discharge_t90_s")).tolist() == [False, True]
+
+
 def test_a_scanned_cone_has_the_rings_of_a_cone(material, tmp_path):
     """Mean of h − s r over a ≤ r < b: h − 2 s (b³ − a³)/(3 (b² − a²))."""
     height, slope = 0.030, 0.5
@@ -232,6 +249,10 @@ def test_a_drum_s_sheet_is_read_as_the_laboratory_does(tmp_path):
     new(folder, *drum)
     (angle,) = (one for one in analyse("drum", asset_path("laboratory", "drum")).derived if one.name == "dynamic_angle")
     assert values(folder, "A", "dynamic_angle_deg") == pytest.approx(np.degrees(angle.values), rel=1e-12)
+    rows = asset_path("laboratory", "drum").read_text().replace(",37.5,0.5,", ",,,", 1)
+    (tmp_path / "gap.csv").write_text(rows)
+    gap = [str(tmp_path / "gap.csv") if one == "drum" else one for one in drum]
+    assert "no lower angle in replicate 1 of mixture" in refused(explorer("new", "measurement", tmp_path / "b", *gap))
     drum[-3] = "rig.speed_rpm=20"
     assert "its Froude number is" in refused(explorer("new", "measurement", tmp_path / "b", *drum))
 
