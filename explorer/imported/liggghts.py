@@ -202,6 +202,14 @@ def _model(found: Found, words: list[str], rolling: Mapping[frozenset[str], floa
         found.settings.setdefault("contact", {})["law"] = LAWS[model]
     else:
         found.notes.append(f"model {model}: no counterpart, {HertzMindlin.name} is taken")
+    tangential = chosen.get("tangential", "off")
+    if tangential == "history":
+        found.notes.append(
+            "tangential history keeps the spring as a displacement and leaves the dashpot without a cap; here "
+            'contact.tangential_law = "mindlin" and contact.tangential_dashpot = "uncapped" do so'
+        )
+    else:
+        found.notes.append(f"tangential {tangential}: no counterpart; here friction acts with a spring")
     for key in ("cohesion", "surface"):
         if chosen.get(key, "off") not in ("off", "default", "sphere"):
             found.notes.append(f"{key} {chosen[key]}: no counterpart, not taken")

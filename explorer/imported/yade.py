@@ -224,6 +224,12 @@ def _deck(folder: Path) -> Found:
             numbers = {"static_friction": math.tan(law["friction_angle"][a][b]), "restitution": restitution_of(ratio)}
             found.pairs[frozenset((one, other))] = numbers
     found.settings["gravity"] = list(deck.gravity)
+    found.settings["contact"] = {
+        "law": deck.law,
+        "characteristic_velocity": deck.characteristic_velocity,
+        "tangential_law": deck.tangential_law,
+        "tangential_dashpot": deck.tangential_dashpot,
+    }
     found.notes += [
         "friction: tan(friction_angle); restitution: of the damping ratio",
         "not taken: the pour of the deck",

@@ -94,6 +94,7 @@ def test_a_liggghts_script(tmp_path):
     (body,) = scene.bodies
     assert (body.name, body.extents[0]) == ("pts1", pytest.approx(3e-3))
     assert "cohesionEnergyDensity: no counterpart" in said
+    assert "tangential history keeps the spring as a displacement" in said
     assert "rolling friction: cdt there" in said
     assert "type1 and type2 0.03" in said
     assert scene.assumed == ()
@@ -104,6 +105,11 @@ def test_a_rolling_friction_without_a_model_does_not_act_in_liggghts(tmp_path):
     scene, said = imported("liggghts", LIGGGHTS.replace(" rolling_friction cdt", ""), tmp_path)
     assert numbers(scene, "effect.rolling_resistance.rolling_friction") == [0.0]
     assert "coefficientRollingFriction: no rolling_friction in pair_style" in said
+
+
+def test_a_liggghts_script_without_friction_says_that_here_it_acts(tmp_path):
+    _, said = imported("liggghts", LIGGGHTS.replace("tangential history rolling", "tangential off rolling"), tmp_path)
+    assert "tangential off: no counterpart; here friction acts" in said
 
 
 def test_a_yade_script_is_read_and_not_run(tmp_path):
@@ -238,10 +244,12 @@ def test_a_deck_for_liggghts_comes_back(declared, tmp_path):
 
 
 def test_a_deck_for_yade_comes_back(declared, tmp_path):
+    declared = with_settings(declared, ["contact.tangential_law=mindlin", "contact.tangential_dashpot=uncapped"])
     write_yade(tmp_path, deck_of_nothing(declared))
     again, _ = read_back("yade", tmp_path / "yade_pour.py", tmp_path)
     same(declared, again, {**{body.name: body.name for body in declared.bodies}, "rigid_sieve_plate": "wall"})
     assert [body.name for body in again.bodies] == [body.name for body in declared.bodies]
+    assert again.contact == declared.contact
 
 
 def test_tables_for_edem_come_back(declared, tmp_path):
