@@ -58,7 +58,7 @@ class PourRecorder:
     def sample(self, k: int, pour: Pour) -> None:
         """Log the present state of pour ``k`` if a frame is due (always when it has ended)."""
         if k not in self._open:
-            self._open[k] = FollowedPour(PourLog(self._paths[k], pour.scene, pour.seed))
+            self._open[k] = FollowedPour(PourLog(self._paths[k], pour.declared, pour.seed))
             self._pours[k] = RecordedPour(self._paths[k])
         if self._open[k].sample(pour):
             self._pours[k] = self._pours[k].with_frame(pour.time)

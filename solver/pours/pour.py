@@ -58,12 +58,13 @@ Summary = dict[str, float]
 
 
 class Pour:
-    """State of one pour; ``scene`` is the scene with its set-up effects applied.
+    """State of one pour; ``scene`` is the scene with its set-up effects applied, ``declared`` that without.
 
     Drive it with :meth:`steps_due`, ``batch.advance`` and :meth:`after`.
     """
 
     def __init__(self, batch: Batch, w: int, scene: Scene, seed: int) -> None:
+        self.declared = scene
         scene = actual(scene)
         self.batch, self.w, self.scene, self.seed = batch, w, scene, seed
         self.rig = pour_rig(scene)
@@ -172,6 +173,7 @@ class Pour:
         Only materials, pairs and effects of contacts and bodies may differ from the present scene; anything else needs
         a new pour. Effects must be compiled into the batch (RuntimeError otherwise): see :meth:`move_to`.
         """
+        self.declared = scene
         scene = actual(scene)
         target = law_table(scene)
         self.batch.set_effects(self.w, scene)

@@ -97,6 +97,17 @@ def test_last_frame_is_the_record(poured):
     assert seen == len(record.bodies.mass) > 0
 
 
+@pytest.mark.usefixtures("taichi")
+def test_the_recorded_scene_has_the_set_up_effects_that_were_declared(scene, tmp_path):
+    declared = with_values(scene, {"effect.plate_tilt.tilt_x": 2.0, "effect.funnel_offset.dx": 1e-3})
+    with recorder_of(tmp_path / "pour.rrd", [3]) as recorder:
+        ((_, record),) = run_pours([Job(declared, 3)], on_sample=recorder.sample)
+        recorder.finish(0, record)
+    recorded = read_recording(tmp_path / "pour.rrd").scene
+    assert recorded.effect("plate_tilt") == declared.effect("plate_tilt")
+    assert recorded.effect("funnel_offset") == declared.effect("funnel_offset")
+
+
 def test_curves_are_the_trace(poured):
     record, path = poured
     energy = rows(path, "/curves/energy/kinetic_energy_mJ", "Scalars:scalars")
