@@ -10,6 +10,8 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from explorer.errors import CommandError
 from explorer.files.output_file import check_new_file, write_whole, write_whole_bytes
 from explorer.photograph.annotated import sheet
@@ -28,6 +30,7 @@ from solver.photograph import (
     read_photograph,
     reference_pixels,
 )
+from solver.photograph.lens import centred, straight, straightened
 
 FARTHEST = 1e5
 """Largest coordinate that a picture may be asked about [px]."""
@@ -144,18 +147,28 @@ def _board(path: Path, pictures: list[Picture]) -> Board:
 
 
 def _reading(picture: Picture, order: MeasureOrder, board: Board | None) -> PhotographedPile | Refusal:
+    bend = None if board is None else board.bend
+    known = 0.0 if bend is None else bend.k
     try:
-        scale = _metres_per_pixel(picture, order)
+        found = read_photograph(picture, _metres_per_pixel(picture, order, known), order.base_line, bend)
+        if isinstance(found, Refusal) or order.reference_length is None or found.lens == known:
+            return found
+        # The base line showed the bend of the lens, which the bar has as well.
+        return read_photograph(picture, _metres_per_pixel(picture, order, found.lens), order.base_line, bend)
     except NotAPile as reason:
         return Refusal(picture.name, reason.reason, reason.detail)
-    return read_photograph(picture, scale, order.base_line, None if board is None else board.bend)
 
 
-def _metres_per_pixel(picture: Picture, order: MeasureOrder) -> float | None:
+def _metres_per_pixel(picture: Picture, order: MeasureOrder, bend: float) -> float | None:
+    """Scale of ``picture``, or of its straight copy if the lens has a ``bend``."""
     if order.reference_length is None:
         return order.metres_per_pixel
-    ends = order.reference_ends
-    return order.reference_length / (math.dist(ends[:2], ends[2:]) if ends else reference_pixels(picture))
+    if order.reference_ends is None:
+        return order.reference_length / reference_pixels(straightened(picture, bend) if bend else picture)
+    x, y = np.array(order.reference_ends).reshape(2, 2).T
+    u, v, half = centred(x, y, (picture.height, picture.width))
+    u, v = straight(u, v, bend)
+    return order.reference_length / (half * math.hypot(u[1] - u[0], v[1] - v[0]))
 
 
 def outline_text(pile: PhotographedPile) -> str:
