@@ -40,6 +40,8 @@ LARGE_LOSS = 0.01
 """Of the mass, from which on a loss is named; our own limit. ASTM and ISO have their own, by kind of material."""
 EDGE = 1e-3
 """Of the mass, next to none and all, where the double logarithm is made of errors of weighing."""
+LEAST_EXPONENT = 0.01
+"""Rosin–Rammler exponent below which a curve is level: real powders have 0.5 and more."""
 FEWEST_SIEVES = 3
 """Through which a line of Rosin and Rammler is laid; two fix it and show no misfit."""
 SIGMA = float(stats.norm.cdf(1.0))
@@ -93,17 +95,22 @@ def sieve(table: Table) -> tuple[tuple[Derived, ...], tuple[str, ...]]:
             if math.isfinite(lost) and abs(lost) > LARGE_LOSS:
                 notes.append(f"{of[0]}, replicate {name}: {100.0 * lost:.2g} % of the sample were lost in sieving")
         for quantity, unit, formula, value in QUANTITIES:
-            values = [value(sample) for sample in samples.values()]
-            if all(map(math.isfinite, values)):
-                errors = [propagated(sample, value) for sample in samples.values()]
+            values = {name: value(sample) for name, sample in samples.items()}
+            missing = [name for name, one in values.items() if not math.isfinite(one)]
+            if quantity == "sieving_loss" and len(missing) < len(values):
+                # A sample that was not weighed before has none; those of the others stand.
+                values = {name: one for name, one in values.items() if name not in missing}
+            elif missing and quantity != "sieving_loss":
+                why = "the sieves do not reach so far"
+                if quantity.startswith("rosin_rammler"):
+                    why = f"fewer than {FEWEST_SIEVES} sieves lie in the curve, or it does not rise,"
+                where = f"in replicate {', '.join(missing)}; add coarser or finer ones"
+                notes.append(f"{of[0]}: no {quantity}: {why} {where}")
+            if all(map(math.isfinite, values.values())):
+                errors = [propagated(samples[name], value) for name in values]
                 path = f"body.{of[0]}.size_spread" if quantity == "size_spread" else ""
-                found.append(derived(table, quantity, unit, of, formula, list(samples), values, path, (), errors))
-            elif quantity != "sieving_loss":
-                missing = ", ".join(name for name, one in zip(samples, values, strict=True) if not math.isfinite(one))
-                notes.append(
-                    f"{of[0]}: no {quantity}: the sieves do not reach so far in replicate {missing}; add coarser or "
-                    "finer ones"
-                )
+                names, of_all = list(values), list(values.values())
+                found.append(derived(table, quantity, unit, of, formula, names, of_all, path, (), errors))
     return tuple(found), tuple(notes)
 
 
@@ -149,12 +156,14 @@ def number_mean(rows: Sequence[Reading]) -> float:
 
 
 def rosin_rammler(rows: Sequence[Reading]) -> tuple[float, float]:
-    """x' [m] and n; NaN with fewer than ``FEWEST_SIEVES`` sieves in the curve."""
+    """x' [m] and n; NaN with fewer than ``FEWEST_SIEVES`` sieves in the curve, or if it does not rise there."""
     x, finer = undersize(rows)
     inside = (finer > EDGE) & (finer < 1.0 - EDGE)
     if inside.sum() < FEWEST_SIEVES:
         return math.nan, math.nan
     n, constant = np.polyfit(np.log(x[inside]), np.log(-np.log1p(-finer[inside])), 1)
+    if n < LEAST_EXPONENT:
+        return math.nan, math.nan
     return float(np.exp(-constant / n)), float(n)
 
 

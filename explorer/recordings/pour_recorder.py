@@ -64,8 +64,10 @@ class PourRecorder:
             self._pours[k] = self._pours[k].with_frame(pour.time)
 
     def finish(self, k: int, record: Record) -> None:
-        """Log the outcome of pour ``k`` and close its file."""
-        followed = self._open.pop(k)
+        """Log the outcome of pour ``k`` and close its file. One that was interrupted at its very end has none."""
+        followed = self._open.pop(k, None)
+        if followed is None:
+            return
         with followed.log:
             followed.finish(record)
 

@@ -64,6 +64,30 @@ def test_the_order_of_the_rows_does_not_matter():
     assert percentile(rows[::-1], 0.5) == percentile(rows, 0.5)
 
 
+def test_a_level_curve_has_no_rosin_rammler_line(tmp_path):
+    """Between the pan and one coarse sieve nothing stays: the share is the same at all openings between."""
+    rows = [
+        Reading(k, ("s",), "1", {"aperture": x, "mass_retained": m})
+        for k, (x, m) in enumerate(zip((0.0, 1e-3, 2e-3, 4e-3, 8e-3), (0.5, 0.0, 0.0, 0.0, 0.5), strict=True))
+    ]
+    assert np.isnan(rosin_rammler(rows)).all()
+    found, result = found_in(tmp_path, rows)
+    assert "rosin_rammler_exponent" not in found
+    assert any("no rosin_rammler_exponent: fewer than" in note for note in result.notes)
+
+
+def test_samples_that_were_weighed_have_a_loss_whatever_the_others_have(tmp_path):
+    rows = "".join(
+        f"s,{k},{aperture},{mass},{total if aperture == 0 else ''}\n"
+        for k, total in ((1, 102.0), (2, ""), (3, 104.0))
+        for aperture, mass in ((0, 20.0), (1, 50.0), (2, 30.0))
+    )
+    result = analyse("sieve", written(tmp_path, HEAD + rows))
+    (loss,) = (one for one in result.derived if one.name == "sieving_loss")
+    assert loss.replicates == ("1", "3")
+    assert loss.values == pytest.approx((1.0 - 100.0 / 102.0, 1.0 - 100.0 / 104.0))
+
+
 def test_a_rosin_rammler_distribution_is_given_back():
     rows = stack(np.geomspace(0.5e-3, 5e-3, 8), lambda x: -math.expm1(-((x / 2.5e-3) ** 1.7)))
     assert rosin_rammler(rows) == pytest.approx((2.5e-3, 1.7))

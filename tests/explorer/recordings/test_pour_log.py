@@ -97,6 +97,13 @@ def test_last_frame_is_the_record(poured):
     assert seen == len(record.bodies.mass) > 0
 
 
+def test_a_pour_without_a_sample_is_not_recorded(poured, tmp_path):
+    with recorder_of(tmp_path / "pour.rrd", [3]) as recorder:
+        recorder.finish(0, poured[0])
+    assert recorder.pours == ()
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.usefixtures("taichi")
 def test_the_recorded_scene_has_the_set_up_effects_that_were_declared(scene, tmp_path):
     declared = with_values(scene, {"effect.plate_tilt.tilt_x": 2.0, "effect.funnel_offset.dx": 1e-3})
