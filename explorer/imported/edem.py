@@ -152,7 +152,12 @@ def _edem_numbers(
             if ours in rolling:
                 rolling[ours][frozenset(names)] = value
             elif ours in ("restitution", "static_friction"):
-                found.pairs.setdefault(frozenset(names), {})[ours] = value
+                entry = found.pairs.setdefault(frozenset(names), {})
+                if entry.get(ours, value) != value:
+                    found.notes.append(
+                        f"{' and '.join(names)}: {ours} {entry[ours]:g}, then {value:g}; the last is taken"
+                    )
+                entry[ours] = value
             else:
                 found.materials.setdefault(names[0], {})[ours] = value
 

@@ -144,6 +144,13 @@ def test_what_meets_others_but_never_itself_is_no_grain(tmp_path):
     assert "no bodies are named: maize are poured, and the walls are of steel" in said
 
 
+def test_a_pair_that_is_stated_twice_is_told(tmp_path):
+    scene, said = imported("edem", EDEM + "maize,maize,0.3,0.431,0.0782\n", tmp_path, "table.csv")
+    assert numbers(scene, "pair.maize.maize.restitution") == [0.3]
+    assert "maize and maize: restitution 0.182, then 0.3; the last is taken" in said
+    assert "static_friction 0.431, then" not in said
+
+
 def test_edem_s_table_has_the_shear_modulus(tmp_path):
     scene, said = imported("edem", EDEM, tmp_path, "table.csv")
     maize = scene.material("maize")
