@@ -72,7 +72,6 @@ PARTS = {
     "a page killed 10 times": Part(
         (sys.executable, "-m", "tests.faults.kills", "page", "--kills", "10"), nightly=False
     ),
-    "memory over 2,000 pours": Part((sys.executable, "-m", "tests.faults.memory", "--pours", "2000")),
     "memory over 10,000 pours": Part((sys.executable, "-m", "tests.faults.memory", "--pours", "10000"), nightly=False),
     "trefoils": Part((*SLOW, "tests/explorer/diagnosis/test_trefoils.py"), nightly=False),
     "other engines, 18 pours each": Part((*SLOW, "-s", "tests/peers/test_same_pile.py"), nightly=False),
