@@ -27,8 +27,8 @@ from doe.errors import StatisticsError
 from doe.record import Record
 
 ENOUGH_FOR_SEVERAL = 15
-DISTINCT = 3
-"""Least number of different values that are tested for normality and outliers."""
+DISTINCT, FEW = 3, 5
+"""Least number of different values that are tested for normality; up to ``FEW`` replicates also for outliers."""
 LARGEST_SHARE = 0.2
 """Of the values, that may be outliers where there are enough to look for several."""
 NEGLIGIBLE = 1e-12
@@ -69,8 +69,8 @@ def summarise(values: npt.ArrayLike, level: float = 0.95) -> ReplicateSummary:
     half = float(stats.t.ppf(0.5 + 0.5 * level, n - 1)) * error if n > 1 else math.nan
     spreads = np.unique(array).size >= DISTINCT and sd > NEGLIGIBLE * float(np.abs(array).max())
     w, p = map(float, stats.shapiro(array)) if spreads else (math.nan, math.nan)
-    # Of three readings two that are rounded to the same number make the third an outlier, however near it is.
-    found = outliers(array) if np.unique(array).size >= DISTINCT else ()
+    # Of few readings those that are rounded to the same number make the other an outlier, however near it is.
+    found = outliers(array) if n > FEW or np.unique(array).size >= DISTINCT else ()
     kept = np.delete(array, list(found))
     return ReplicateSummary(
         n=n,

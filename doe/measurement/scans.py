@@ -45,6 +45,8 @@ FEWEST = 200
 PLATE_SHARE, PLATE_DEPTH = 0.2, 0.05
 """Share of the points that must lie on the bare plate for it to be found, and how far from it they may lie, as a
 share of the scan's height."""
+PROBED = 200
+"""Rows at the end of a table that are looked at for what divides its cells."""
 NEIGHBOURS, REGULAR = 4, 1.05
 """Points next to one on a square grid, and how much farther than the nearest the last of them may be, in a grid."""
 ROUNDS = 30
@@ -70,7 +72,7 @@ class ScanSettings:
     axis_error: Annotated[float, Quantity("m", above=0.0)] = AXIS_ERROR
     """Standard deviation of each coordinate of the axis."""
     grid: Annotated[float, Quantity("m", above=0.0)] | None = None
-    """Resolution; by default the spacing of the points."""
+    """Resolution; by default that of the points (:func:`spacing`)."""
     noise: Annotated[float, Quantity("m", above=0.0)] | None = None
     """Standard deviation of one height, where it is known."""
 
@@ -105,7 +107,7 @@ class Scan:
     points: Array
     """(n, 3)"""
     grid: float
-    """Resolution [m]: spacing of the points."""
+    """Resolution [m]: width of the cells in which the points are read."""
     axis: tuple[float, float] | None
     """Where the axis is said to be in the file's coordinates [m]; if None, x and y are relative to the centre of the
     volume."""
@@ -175,8 +177,10 @@ def read_scan(path: Path, settings: ScanSettings) -> Scan:
         # Heights are taken along the plate's normal; the few degrees of a scanner's frame change x and y by less
         # than a thousandth.
         points[:, 2] /= np.sqrt(1.0 + b * b + c * c)
-        grid = settings.grid or grid or spacing(points)
-        points[:, :2] -= settings.axis if settings.axis is not None else _volume_centre(points, grid)
+        grid = settings.grid or grid
+        near = grid or _distances(points)[0]
+        points[:, :2] -= settings.axis if settings.axis is not None else _volume_centre(points, near)
+        grid = grid or spacing(points)
     except MeasurementError as error:
         raise MeasurementError(f"{path}: {error}") from None
     except (OSError, ParameterError) as error:
@@ -219,18 +223,23 @@ def spacing(points: Array) -> float:
     nearest. Of a cloud it is twice that to the fourth: cells as narrow as the nearest would mostly be empty, and 1 % of
     these are (4.8 points in a cell at random places).
     """
-    some = points[:: max(1, len(points) // 1000), :2]
-    distance = cKDTree(points[:, :2]).query(some, k=1 + NEIGHBOURS)[0][:, 1:]
-    distance = distance[np.isfinite(distance[:, -1]) & (distance[:, 0] > 0.0)]
-    if not len(distance):
-        return 0.0
-    nearest, fourth = float(np.median(distance[:, 0])), float(np.median(distance[:, -1]))
+    nearest, fourth = _distances(points)
     return nearest if fourth <= REGULAR * nearest else 2.0 * fourth
 
 
-def _volume_centre(points: Array, grid: float) -> Array:
-    """Horizontal centre (x, y) of the volume above the plate, for points of uniform density."""
-    height = np.where(points[:, 2] > 2.0 * grid, points[:, 2], 0.0)
+def _distances(points: Array) -> tuple[float, float]:
+    """Median distances in the plane of a point to the nearest other one and to the fourth [m]; 0 without."""
+    some = points[:: max(1, len(points) // 1000), :2]
+    distance = cKDTree(points[:, :2]).query(some, k=1 + NEIGHBOURS)[0][:, 1:]
+    distance = distance[np.isfinite(distance[:, -1]) & (distance[:, 0] > 0.0)]
+    return (float(np.median(distance[:, 0])), float(np.median(distance[:, -1]))) if len(distance) else (0.0, 0.0)
+
+
+def _volume_centre(points: Array, near: float) -> Array:
+    """Horizontal centre (x, y) of the volume above the plate; the points have a uniform density, and the nearest are
+    ``near`` [m].
+    """
+    height = np.where(points[:, 2] > 2.0 * near, points[:, 2], 0.0)
     if height.sum() <= 0.0:
         raise MeasurementError("nothing lies on the plate; state scan.axis = [x, y]")
     return np.asarray(height @ points[:, :2] / height.sum(), dtype=np.float64)
@@ -292,12 +301,15 @@ def _of_table(path: Path) -> Array:
     text = decoded(path.read_bytes())
     if text is None:
         raise MeasurementError("not a text file")
-    rows = [row for line in text.splitlines() if (row := line.strip(" \r")) and row.strip() and row[0] != "#"]
-    decimal_comma = bool(rows) and _decimal_comma(rows[-1])
-    signs = ";\t" if decimal_comma else ";\t,"
-    delimiter = next((sign for sign in signs if rows and sign in rows[-1]), None)
-    # A cell may be empty: a height that the scanner did not see.
-    rows = [" ".join(cell.strip() or "nan" for cell in row.split(delimiter)) for row in rows]
+    rows = [row for line in text.splitlines() if (row := line.strip()) and not row.startswith("#")]
+    # A row with as many cells filled as any tells what divides them.
+    probe = max(reversed(rows[-PROBED:]), key=lambda row: len(row.replace(";", " ").split()), default="")
+    decimal_comma = _decimal_comma(probe)
+    delimiter = next((sign for sign in (";\t" if decimal_comma else ";,\t") if sign in probe), None)
+    if delimiter:
+        # A cell may be empty: a height that the scanner did not see.
+        cells = ([cell.strip() or "nan" for cell in row.split(delimiter)] for row in rows)
+        rows = [" ".join(row + ["nan"] * (3 - len(row))) for row in cells]
     if decimal_comma:
         rows = [row.replace(",", ".") for row in rows]
     if rows and not _numeric(rows[0]):

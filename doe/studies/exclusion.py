@@ -24,7 +24,7 @@ USUAL_SEED = 1
 class ExcludedRun:
     """One excluded run of the response surface: its setting, experiment ("": the study's own rig), seed and reason.
 
-    ``key``: the run's key in the store, which no pour of another scene has.
+    ``key``: the run's key in the store, which no pour of another scene has; "" in files of older versions.
     """
 
     label: str
@@ -40,7 +40,8 @@ class ExcludedRun:
 
     def is_of(self, run: Run) -> bool:
         """Return whether ``run`` is the excluded one."""
-        return (self.label, self.experiment, self.key) == (run.label, run.experiment, run.key)
+        same = (self.label, self.experiment, self.seed) == (run.label, run.experiment, run.seed)
+        return same and self.key in ("", run.key)
 
 
 def optimum_without(result: StudyResult, excluded: Sequence[ExcludedRun]) -> OptimumResult:

@@ -146,6 +146,9 @@ CALIBRATED = 3
 TRIES = 3
 """Number of seeds tried for one replicate; a run that jammed or broke is kept with its outcome and replaced."""
 
+OF_ONE_RIG = ("rig", "insertion", "numerics")
+"""First parts of the paths of parameters that belong to one experiment, not to the material."""
+
 EXPERIMENT = re.compile(r"[\w-]{1,60}")
 """Allowed names of an experiment: the name precedes those of its observables."""
 
@@ -329,10 +332,9 @@ def with_profile(study: Study, name: str) -> tuple[Study, Profile]:
             f"{MIN_BODIES} bodies or more are needed"
         )
     _refuse_without_error(study, profile)
-    # What is assumed of the shapes is what the profile pours.
-    assumed = tuple(
-        replace(one, reference=profile.spheres) if one.path == "body.spheres" else one for one in study.assumptions
-    )
+    # What is assumed of shapes and mass is what the profile pours.
+    poured: Values = {"body.spheres": profile.spheres, **mass}
+    assumed = tuple(replace(one, reference=poured.get(one.path, one.reference)) for one in study.assumptions)
     return replace(study, scene=scene, experiments=experiments, assumptions=assumed), profile
 
 
@@ -364,10 +366,9 @@ def study_from(table: Settings, path: Path) -> Study:
     screening = main_effect_design(file.screening, "screening", "factor", SCREENING, factors, file.dummies)
     assumptions = tuple(_levels(scene, entry) for entry in file.assumption)
     _refuse_twins([*factors, *assumptions])
-    _require_room([*factors, *assumptions], [body.name for body in scene.bodies])
-    # A mass fraction that is set to what it is would scale the others by a rounding error.
-    assumed = {one.path: one.reference for one in assumptions if one.reference != value(scene, one.path)}
-    scene = with_values(scene, {one.path: one.reference for one in factors} | assumed)
+    for together in (factors, assumptions):
+        _require_room(together, [body.name for body in scene.bodies])
+    scene = with_values(scene, {one.path: one.reference for one in (*factors, *assumptions)})
     beside = main_effect_design(file.assumptions, "assumptions", "assumption", ASSUMPTIONS, assumptions, None)
     for name in file.fallback:
         one_of(name, "fallback", [factor.name for factor in factors])
@@ -376,7 +377,8 @@ def study_from(table: Settings, path: Path) -> Study:
     if not file.target:
         raise StudyFileError("target: at least one [[target]] is needed")
     given = observable_names(scene)
-    experiments = _experiments(load_material(file.material, relative_to=path.parent), table, path, factors)
+    material = load_material(file.material, relative_to=path.parent)
+    experiments = _experiments(material, table, path, factors, assumptions)
     readings = [*given, *(f"{name}/{one}" for name, other in experiments.items() for one in observable_names(other))]
     for target, entry in zip(file.target, table["target"], strict=True):
         one_of(target.observable, "target.observable", readings)
@@ -433,7 +435,9 @@ def _require_possible(target: Target) -> None:
         raise StudyFileError(f"target.mean: {target.mean:g}{unit} of {target.observable}; allowed: {allowed}")
 
 
-def _experiments(material: Scene, table: Settings, path: Path, factors: Sequence[Factor]) -> dict[str, Scene]:
+def _experiments(
+    material: Scene, table: Settings, path: Path, factors: Sequence[Factor], assumptions: Sequence[Factor]
+) -> dict[str, Scene]:
     """The scene of each experiment: the study's material, contact and effects, in its own rig with its own mass."""
     found: dict[str, Scene] = {}
     shared = {key: table[key] for key in ("contact", "effect") if key in table}
@@ -453,7 +457,9 @@ def _experiments(material: Scene, table: Settings, path: Path, factors: Sequence
                     f"factor.path: {factor.path} of {factor.name} is no parameter of the experiment {name}; "
                     "allowed are those that all experiments share, such as material.… and pair.…"
                 )
-        found[name] = with_values(other, {factor.path: factor.reference for factor in factors})
+        # What is assumed of the material holds in every rig.
+        assumed = [one for one in assumptions if one.path.split(".")[0] not in OF_ONE_RIG]
+        found[name] = with_values(other, {one.path: one.reference for one in (*factors, *assumed)})
     return found
 
 
@@ -492,10 +498,10 @@ def _refuse_twins(factors: list[Factor]) -> None:
             seen.add(value)
 
 
-def _require_room(factors: list[Factor], bodies: list[str]) -> None:
-    """Refuse mass fractions that cannot all be high at once."""
+def _require_room(factors: Sequence[Factor], bodies: list[str]) -> None:
+    """Refuse mass fractions that are varied together and cannot all be high at once."""
     high = {one.path.split(".")[1]: float(one.high) for one in factors if one.path.endswith(".mass_fraction")}
-    if len(high) > 1 and (len(high) == len(bodies) or sum(high.values()) > 1.0):
+    if len(high) > 1 and (len(high) == len(bodies) or sum(high.values()) > 1.0 + 1e-6):
         raise StudyFileError(
             f"factor.path: mass fractions of {', '.join(high)}, up to {sum(high.values()):g} together; allowed: up to "
             "1, with at least one component left to take the rest"

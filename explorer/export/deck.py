@@ -132,12 +132,15 @@ class DeckTarget(ExportTarget):
     def write(self, folder: Path, order: ExportOrder) -> str:
         """Run the pour, and write its deck."""
         # Imported here because it loads Taichi, which merely naming a target does not need.
-        from solver import body_counts, run_pour
+        from solver import Outcome, body_counts, run_pour
 
-        deck = deck_of(run_pour(order.scene, order.seed), order.time)
+        record = run_pour(order.scene, order.seed)
+        deck = deck_of(record, order.time)
         self.write_deck(folder, deck)
-        missing = sum(body_counts(order.scene)) - deck.bodies
-        cut = f" ({missing} more had not entered when the time was up; state a longer --time)" if missing else ""
+        missing, why = sum(body_counts(order.scene)) - deck.bodies, "the time was up; state a longer --time"
+        if order.time is None and record.outcome != Outcome.TIME_LIMIT:
+            why = f"the pour here ended ({record.outcome.replace('_', ' ')})"
+        cut = f" ({missing} more had not entered when {why})" if missing else ""
         return f"{deck.bodies} bodies{cut}, {deck.steps} steps of {deck.dt:.4g} s; how to run it: README.txt"
 
     def write_deck(self, folder: Path, deck: Deck) -> None:

@@ -208,7 +208,7 @@ def _model(found: Found, words: list[str], rolling: Mapping[frozenset[str], floa
             "tangential history keeps the spring as a displacement and leaves the dashpot without a cap; here "
             'contact.tangential_law = "mindlin" and contact.tangential_dashpot = "uncapped" do so'
         )
-    else:
+    elif words:
         found.notes.append(f"tangential {tangential}: no counterpart; here friction acts with a spring")
     for key in ("cohesion", "surface"):
         if chosen.get(key, "off") not in ("off", "default", "sphere"):

@@ -64,10 +64,13 @@ def _words(call: ast.Call) -> dict[str, ast.expr]:
 
 
 def _constants(tree: ast.Module, call: ast.Call) -> dict[str, float]:
-    """Names that stand for a number where ``call`` is made: the script's assignments above it."""
+    """Names that stand for a number where ``call`` is made: the script's assignments above it, or for a call within a
+    function, which may run later, all of them."""
     names: dict[str, float] = {}
+    holds = next((node for node in reversed(tree.body) if node.lineno <= call.lineno), None)
     for node in tree.body:
-        if (node.lineno, node.col_offset) >= (call.lineno, call.col_offset):
+        above = (node.lineno, node.col_offset) < (call.lineno, call.col_offset)
+        if not above and not isinstance(holds, ast.FunctionDef | ast.ClassDef):
             break
         if isinstance(node, ast.Assign) and len(node.targets) == 1:
             target, value = node.targets[0], node.value

@@ -334,7 +334,7 @@ def _scans(brought: Brought, found: Readings) -> None:
         found.rows.extend(
             Row(k, "height_profile_m", float(z), float(r)) for r, z in zip(middle.round(6), height, strict=True)
         )
-        found.told.append(f"{file.name}: a point every {1e3 * scan.grid:.3g} mm, {1e3 * height.max():.4g} mm high")
+        found.told.append(f"{file.name}: read in cells of {1e3 * scan.grid:.3g} mm, {1e3 * height.max():.4g} mm high")
     found.sources.append("height_profile_m: rings about the middle of the volume of scans/, bare plate as 0")
 
 

@@ -42,7 +42,7 @@ from explorer.scene.meshes import (
 )
 from explorer.scene.text import material_toml
 from explorer.viewer.palette import GLASS, PLATE, component_colour
-from solver import Scene
+from solver import Scene, actual
 from solver.observables import Value
 
 APPLICATION = "repose-explorer"
@@ -104,6 +104,8 @@ class PourLog:
 
     def __init__(self, to: Path | RunningViewer | rr.RecordingStream, scene: Scene, seed: int, under: str = "") -> None:
         self._scene, self._under = scene, under
+        self._bodies = actual(scene).bodies
+        """What is drawn: effects of the set-up change their shapes and sizes."""
         self._shown: set[int] = set()
         self._left: dict[int, npt.NDArray[np.int32]] = {}
         self._gate_shown = False
@@ -129,7 +131,7 @@ class PourLog:
         ``surfaces``: poses of the rig's surfaces, as in ``rig_poses``; None: as they were.
         """
         self._at(time, step)
-        for k in range(len(self._scene.bodies)):
+        for k in range(len(self._bodies)):
             self._component(k, poses)
         self._gate(gate_shut)
         self._surfaces(self._poses if surfaces is None or not len(surfaces) else surfaces)
@@ -196,7 +198,7 @@ class PourLog:
 
         Its mesh is there only while it has bodies: the viewer draws a mesh without poses where it is.
         """
-        body = self._scene.bodies[k]
+        body = self._bodies[k]
         entity = f"world/bodies/{rr.escape_entity_path_part(body.name)}"
         mine = poses.component == k
         chosen = mine & poses.inside

@@ -85,8 +85,8 @@ def _file_of(source: str) -> Path:
             return asset_path(kind, stem)
     if is_calibration(source):
         raise ParameterError(
-            f"{source}: the folder of a finished calibration; allowed here: a rig, a material, a set-up or a study "
-            "(`explorer export` takes such a folder, without --material)"
+            f"{source}: a folder with a result.json; allowed here: a rig, a material, a set-up or a study "
+            "(`explorer export` takes the folder of a finished calibration, without --material)"
         )
     if own.is_dir():
         raise ParameterError(f"{source}: the folder holds no result.json of a finished calibration")

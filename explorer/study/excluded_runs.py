@@ -15,6 +15,8 @@ from explorer.files.output_file import write_whole
 
 FILE = "excluded_runs.csv"
 HEADER = ["label", "experiment", "seed", "key", "reason"]
+WITHOUT_KEY = ["label", "experiment", "seed", "reason"]
+"""Of older versions."""
 MOST_BYTES = 1_000_000
 
 
@@ -24,11 +26,13 @@ def load_excluded(folder: Path) -> tuple[ExcludedRun, ...]:
     if not file.is_file():
         return ()
     (_, header), *rows = read_table(file, MOST_BYTES, CommandError).rows or ((0, []),)
+    if header == WITHOUT_KEY:
+        header, rows = HEADER, [(line, [*cells[:3], "", *cells[3:]]) for line, cells in rows]
     if header != HEADER:
         raise CommandError(f"{file}: the header is not {','.join(HEADER)}")
     excluded = []
     for line, cells in rows:
-        if len(cells) != len(HEADER) or not cells[2].isdecimal() or not cells[3] or not cells[4]:
+        if len(cells) != len(HEADER) or not cells[2].isdecimal() or not cells[4]:
             raise CommandError(
                 f"{file}, line {line}: allowed: a setting, its experiment or an empty cell, a seed, the key of a pour, "
                 "a reason"

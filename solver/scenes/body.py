@@ -177,6 +177,8 @@ def with_fractions(bodies: tuple[Body, ...], new: Mapping[str, float]) -> tuple[
     if total > 1.0 + TOTAL_TOLERANCE:
         raise ParameterError(f"{names} {total:g}; allowed: up to 1")
     left, rest = sum(body.mass_fraction for body in others), max(0.0, 1.0 - total)
+    # Shares that are set to what they are leave the others as they are, to the last bit.
+    left = rest if math.isclose(left, rest, rel_tol=1e-12) else left
 
     def share(body: Body) -> float:
         if body.name in new:

@@ -239,7 +239,8 @@ def check(scene: Scene) -> None:
                 f"numerics.max_time: {scene.numerics.max_time:g} s is not longer than the {rig.running_time:g} s for "
                 f"which the {rig.name} runs; raise it, turn faster, or turn fewer times"
             )
-        if (acting := max((one.after for one in rig.actions()), default=0.0)) >= scene.numerics.max_time:
+        acting = max((one.after for one in rig.actions()), default=0.0)
+        if scene.numerics.duration == 0.0 and acting >= scene.numerics.max_time:
             raise ParameterError(
                 f"numerics.max_time: {scene.numerics.max_time:g} s is not longer than the {acting:g} s that the "
                 f"{rig.name} takes to act; raise it, or let the rig act faster"

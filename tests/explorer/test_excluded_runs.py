@@ -53,6 +53,7 @@ def test_another_pour_with_the_same_seed_is_not_left_out(result):
     row = tuple(replace(run, key=f"other {run.key}") for run in result.surface.runs[0])
     other = replace(result, surface=replace(result.surface, runs=(row, *result.surface.runs[1:])))
     assert optimum_without(other, excluded).values == other.optimum.values
+    assert not any(table.title == "Runs left out" for table in study_board(other, None, excluded=excluded).tables)
     assert optimum_without(result, excluded).values != result.optimum.values
 
 
@@ -81,7 +82,7 @@ def test_what_is_left_out_is_kept_with_its_reasons(result, tmp_path):
     [
         "",
         "a,b\n",
-        "label,experiment,seed,reason\np,,1,x\n",
+        "label,experiment,seed,reason\np,,one,x\n",
         "label,experiment,seed,key,reason\np,,one,k,x\n",
         "label,experiment,seed,key,reason\np,,1,k,\n",
     ],
@@ -91,6 +92,15 @@ def test_a_file_of_another_kind_is_refused_in_a_line(tmp_path, text):
     with pytest.raises(CommandError) as refused:
         load_excluded(tmp_path)
     assert "\n" not in str(refused.value)
+
+
+def test_a_file_of_an_older_version_is_known_by_its_seeds(result, tmp_path):
+    run = result.surface.runs[0][0]
+    (tmp_path / FILE).write_text(f"label,experiment,seed,reason\n{run.label},{run.experiment},{run.seed},spilled\n")
+    (one,) = load_excluded(tmp_path)
+    assert one.is_of(run)
+    assert not one.is_of(replace(run, seed=run.seed + 1))
+    assert optimum_without(result, (one,)).values != result.optimum.values
 
 
 def test_the_table_gives_back_what_a_person_writes(result):

@@ -114,7 +114,11 @@ def _answers(result: AnyStudy) -> tuple[BoardTable, ...]:
 
 def _without(result: AnyStudy, excluded: Sequence[ExcludedRun]) -> tuple[BoardTable, ...]:
     """What the study would have answered without the excluded runs, and why they are excluded."""
-    if not isinstance(result, StudyResult) or not excluded:
+    if not isinstance(result, StudyResult):
+        return ()
+    runs = [run for row in result.surface.runs for run in row]
+    excluded = [one for one in excluded if any(one.is_of(run) for run in runs)]
+    if not excluded:
         return ()
     why = Table(("Run left out", "Seed", "Because"), tuple((one.label, str(one.seed), one.reason) for one in excluded))
     reasons = BoardTable("Runs left out", why, folded=False)

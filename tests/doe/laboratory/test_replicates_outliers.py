@@ -41,6 +41,10 @@ def test_two_different_values_name_no_outlier(values):
     assert np.isnan(found.shapiro_p)
 
 
+def test_a_slip_of_the_pen_among_many_equal_readings_is_named():
+    assert summarise([28.5] * 5 + [285.0]).outliers == (5,)
+
+
 def test_all_of_several_outliers_are_named():
     """Each is beyond its own critical value: 3.17 > 2.71 of twenty, 3.92 > 2.68 of nineteen; 1.59 < 2.65 is not."""
     values = [*np.linspace(-1.0, 1.0, 18), 9.0, -8.0]

@@ -301,6 +301,21 @@ def test_an_empty_cell_is_a_height_that_was_not_seen(tmp_path, between, decimal)
     assert scan.points[:, 2].max() == pytest.approx(0.25e-3)
 
 
+@pytest.mark.parametrize("row", ["{0},{1},{2}\t", "{0},\t{1},\t{2}", "\t{0}\t{1}\t{2}", " {0} , {1} , {2} "])
+def test_what_else_stands_between_cells_does_not_matter(tmp_path, row):
+    path = tmp_path / "scan.txt"
+    path.write_text("".join(row.format(x, y, 0.25 * x) + "\n" for x in range(20) for y in range(20)))
+    scan = read_scan(path, ScanSettings(axis=(0.0, 0.0), plate=(0.0, 0.0, 0.0)))
+    assert scan.points[43].tolist() == [2.0, 3.0, 0.5]
+
+
+def test_the_last_corner_may_be_unseen(tmp_path):
+    path = tmp_path / "scan.txt"
+    rows = [f"{x},5\t{y},5\t{'' if x == y == 19 else '0,25'}\n" for x in range(20) for y in range(20)]
+    path.write_text("".join(rows))
+    assert len(read_scan(path, ScanSettings(axis=(0.0, 0.0), plate=(0.0, 0.0, 0.0))).points) == 399
+
+
 def test_an_image_of_real_numbers_is_read(tmp_path):
     path = tmp_path / "scan.tif"
     Image.fromarray(np.full((20, 20), 0.5, dtype=np.float32)).save(path)

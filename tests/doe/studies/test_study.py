@@ -41,6 +41,18 @@ def test_without_a_mass_in_the_profile_the_rig_s_is_poured():
     assert with_profile(study, "standard")[1].mass == value(study.scene, "rig.mass")
 
 
+def test_mass_fractions_of_factors_and_assumptions_are_poured_as_stated():
+    """The assumption states what the material has; the factor differs from it."""
+    study = study_with(
+        lambda t: (
+            t["factor"][3].update(path="body.plate.mass_fraction", low=0.1, high=0.3, reference=0.20),
+            next(a for a in t["assumption"] if a["path"] == "body.seed.mass_fraction").update(reference=0.78),
+        )
+    )
+    shares = [body.mass_fraction for body in study.scene.bodies]
+    assert shares == pytest.approx([0.78, 0.20, 0.02])
+
+
 def test_what_is_assumed_is_what_is_poured():
     study = study_with(lambda t: t["assumption"][0].update(reference=t["assumption"][0]["high"]))
     one = study.assumptions[0]
@@ -89,8 +101,11 @@ def test_bodies_touched_by_a_factor(path, bodies):
         ),
         (lambda t: t["factor"][3].update(low="90MPa"), "not below"),
         (
-            lambda t: t["factor"][3].update(path="body.plate.mass_fraction", low=0.1, high=0.3, reference=0.14),
-            r"factor\.path: mass fractions of plate, seed, up to 1\.\d+ together; allowed: up to 1, with",
+            lambda t: (
+                t["factor"][3].update(path="body.plate.mass_fraction", low=0.1, high=0.3, reference=0.14),
+                t["factor"][5].update(path="body.petiole.mass_fraction", low=0.05, high=0.8, reference=0.08),
+            ),
+            r"factor\.path: mass fractions of plate, petiole, up to 1\.1 together; allowed: up to 1, with",
         ),
         (lambda t: t["factor"][3].update(reference="1MPa"), "reference"),
         (lambda t: t["factor"][3].update(path="material.seed.colour"), "no such parameter"),

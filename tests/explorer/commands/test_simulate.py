@@ -151,7 +151,6 @@ def test_a_run_that_breaks_off_leaves_no_folder(failure, code, tmp_path, monkeyp
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.usefixtures("taichi")
 def test_an_interrupted_pour_keeps_its_seed(monkeypatch):
     monkeypatch.setattr("explorer.simulation.read_checkpoint", lambda path: SimpleNamespace(seed=3))
     line = refused(explorer("simulate", "funnel", "--resume", "pour.npz", "--seed", 5))
@@ -162,6 +161,7 @@ def test_an_interrupted_pour_keeps_its_seed(monkeypatch):
     assert list(simulation_of(dataclasses.replace(order, resume=None)).seeds) == [1]
 
 
+@pytest.mark.usefixtures("taichi")
 def test_the_recordings_of_a_run_that_is_interrupted_are_named(tmp_path, monkeypatch):
     def interrupted(jobs, **options):
         yield next(pours(jobs, **options))

@@ -135,6 +135,15 @@ def test_a_variable_of_a_yade_script_has_the_value_of_its_line(tmp_path):
     assert numbers(scene, "pair.a.a.static_friction", "pair.a.b.static_friction") == pytest.approx([0.5, 0.2])
 
 
+def test_a_function_of_a_yade_script_may_use_what_is_set_below_it(tmp_path):
+    script = (
+        "def material():\n    return FrictMat(young=E, density=2500, frictionAngle=0.3, label='a')\n"
+        "E = 1e7\nO.materials.append(material())\nwall(0, axis=2, material='a')\n"
+    )
+    scene, _ = imported("yade", script, tmp_path, "script.py")
+    assert scene.material("a").youngs_modulus == pytest.approx(1e7)
+
+
 def test_what_meets_others_but_never_itself_is_no_grain(tmp_path):
     """Two wall materials: one is taken, and what became of all is said."""
     text = EDEM.replace("\n\n", "\nacrylic,0.35,1190,1200,1\n\n") + "maize,acrylic,0.5,0.3,0.04\n"

@@ -23,6 +23,7 @@ from explorer.scene.meshes import rig_poses
 from solver import Job, Outcome, Phase, Scene, run_pours, with_values
 from tests.explorer.command_line import TINY
 
+DISPERSED = {"effect.size_dispersion.spread": 0.1}
 QUARTER_TURN = (0.5**0.5, 0.0, 0.5**0.5, 0.0)
 ROOT = Path(__file__).parents[3]
 
@@ -106,11 +107,13 @@ def test_a_pour_without_a_sample_is_not_recorded(poured, tmp_path):
 
 @pytest.mark.usefixtures("taichi")
 def test_the_recorded_scene_has_the_set_up_effects_that_were_declared(scene, tmp_path):
-    declared = with_values(scene, {"effect.plate_tilt.tilt_x": 2.0, "effect.funnel_offset.dx": 1e-3})
+    declared = with_values(scene, {"effect.plate_tilt.tilt_x": 2.0, "effect.funnel_offset.dx": 1e-3} | DISPERSED)
     with recorder_of(tmp_path / "pour.rrd", [3]) as recorder:
         ((_, record),) = run_pours([Job(declared, 3)], on_sample=recorder.sample)
         recorder.finish(0, record)
+    assert rows(tmp_path / "pour.rrd", "/world/bodies/plate", "InstancePoses3D:scales")
     recorded = read_recording(tmp_path / "pour.rrd").scene
+    assert recorded.effect("size_dispersion") == declared.effect("size_dispersion")
     assert recorded.effect("plate_tilt") == declared.effect("plate_tilt")
     assert recorded.effect("funnel_offset") == declared.effect("funnel_offset")
 

@@ -151,6 +151,6 @@ def test_a_folder_of_no_finished_calibration_is_told_so_and_hides_no_shipped_nam
     with pytest.raises(ParameterError, match=r"^results: the folder holds no result\.json of a finished calibration$"):
         load_scene("results")
     (tmp_path / "results" / "result.json").write_text("{}")
-    with pytest.raises(ParameterError, match=r"^results: the folder of a finished calibration; allowed here: a rig"):
+    with pytest.raises(ParameterError, match=r"^results: a folder with a result\.json; allowed here: a rig"):
         load_scene("results")
     assert load_scene("soybean").bodies
