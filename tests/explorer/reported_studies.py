@@ -17,7 +17,7 @@ from tests.doe.formula_runner import FormulaRunner
 
 STUDY = load_study("sunflower_extract")
 BIAS = {name: tuple((k * step - 0.5, 0.1) for step in (0.3, 3.0, -1.5)) for k, name in enumerate(STUDY.estimators)}
-PROFILE = Profile("test", pilot_runs=10, change_runs=6, verification_runs=20, reach_runs=0)
+PROFILE = Profile("test", mass=0.030, pilot_runs=10, change_runs=6, verification_runs=20, reach_runs=0)
 QUICK = Profile("quick", "coarse", 0.012, 6, 3, 1, 1, 1, 6, 1, 1, 6, reach_runs=3)
 DENSITY = dataclasses.replace(
     STUDY.targets[0], observable="bulk_density_kg_m3", mean=150.0 + 5.0 * 24.68, sd=2.0, sd_source="measured"

@@ -97,9 +97,7 @@ def test_a_folder_is_a_board_that_follows_its_files(tmp_path):
     folder.follow()
     assert pages.page(json.loads(pages.page(folder.address).body)["report"]).body == b"written last"
     left_out = study_from(result).surface.runs[0][0]
-    keep_excluded(
-        tmp_path, study_from(result), [ExcludedRun(left_out.label, left_out.experiment, left_out.seed, "spilled")]
-    )
+    keep_excluded(tmp_path, study_from(result), [ExcludedRun.of(left_out, "spilled")])
     folder.follow()
     assert "spilled" in pages.page(folder.address).body.decode()
     (tmp_path / "result.json").write_text('{"runs": 1}', encoding="utf-8")

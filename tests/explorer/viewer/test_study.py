@@ -299,7 +299,7 @@ def test_runs_are_left_out_of_the_study_that_is_shown(table, result, tmp_path):
     in_hand = table.all_runs
     shown = in_hand.result()
     run = shown.surface.runs[0][0]
-    excluded = [ExcludedRun(run.label, run.experiment, run.seed, "wedged")]
+    excluded = [ExcludedRun.of(run, "wedged")]
     in_hand.take(shown, excluded)
     assert load_excluded(folder) == tuple(excluded)
     told = {one["title"]: one["rows"] for one in table.board()["tables"]}
