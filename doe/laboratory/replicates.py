@@ -67,10 +67,11 @@ def summarise(values: npt.ArrayLike, level: float = 0.95) -> ReplicateSummary:
     sd = float(array.std(ddof=1)) if n > 1 else math.nan
     error = sd / math.sqrt(n)
     half = float(stats.t.ppf(0.5 + 0.5 * level, n - 1)) * error if n > 1 else math.nan
-    spreads = np.unique(array).size >= DISTINCT and sd > NEGLIGIBLE * float(np.abs(array).max())
+    distinct = np.unique(array).size >= DISTINCT
+    spreads = distinct and sd > NEGLIGIBLE * float(np.abs(array).max())
     w, p = map(float, stats.shapiro(array)) if spreads else (math.nan, math.nan)
     # Of few readings those that are rounded to the same number make the other an outlier, however near it is.
-    found = outliers(array) if n > FEW or np.unique(array).size >= DISTINCT else ()
+    found = outliers(array) if n > FEW or distinct else ()
     kept = np.delete(array, list(found))
     return ReplicateSummary(
         n=n,

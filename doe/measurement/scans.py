@@ -177,10 +177,10 @@ def read_scan(path: Path, settings: ScanSettings) -> Scan:
         # Heights are taken along the plate's normal; the few degrees of a scanner's frame change x and y by less
         # than a thousandth.
         points[:, 2] /= np.sqrt(1.0 + b * b + c * c)
-        grid = settings.grid or grid
-        near = grid or _distances(points)[0]
+        given = settings.grid or grid
+        near, fourth = (given, given) if given else _distances(points)
         points[:, :2] -= settings.axis if settings.axis is not None else _volume_centre(points, near)
-        grid = grid or spacing(points)
+        grid = _cell(near, fourth)
     except MeasurementError as error:
         raise MeasurementError(f"{path}: {error}") from None
     except (OSError, ParameterError) as error:
@@ -223,7 +223,10 @@ def spacing(points: Array) -> float:
     nearest. Of a cloud it is twice that to the fourth: cells as narrow as the nearest would mostly be empty, and 1 % of
     these are (4.8 points in a cell at random places).
     """
-    nearest, fourth = _distances(points)
+    return _cell(*_distances(points))
+
+
+def _cell(nearest: float, fourth: float) -> float:
     return nearest if fourth <= REGULAR * nearest else 2.0 * fourth
 
 

@@ -310,9 +310,12 @@ def with_profile(study: Study, name: str) -> tuple[Study, Profile]:
     if name not in study.profiles:
         raise ParameterError(f"{study.file}: profile: {name!r} is not one of {', '.join(study.profiles)}")
     profile = study.profiles[name]
-    mass = {"rig.mass": profile.mass} if profile.mass is not None and "rig.mass" in parameters(study.scene) else {}
-    scene = with_values(study.scene, {"body.spheres": profile.spheres, **mass})
-    profile = replace(profile, mass=float(value(scene, "rig.mass")) if "rig.mass" in parameters(scene) else None)
+    weighed = "rig.mass" in parameters(study.scene)
+    poured: Values = {"body.spheres": profile.spheres}
+    if weighed and profile.mass is not None:
+        poured["rig.mass"] = profile.mass
+    scene = with_values(study.scene, poured)
+    profile = replace(profile, mass=float(value(scene, "rig.mass")) if weighed else None)
     experiments = {
         name: with_values(other, {"body.spheres": profile.spheres}) for name, other in study.experiments.items()
     }
@@ -333,7 +336,6 @@ def with_profile(study: Study, name: str) -> tuple[Study, Profile]:
         )
     _refuse_without_error(study, profile)
     # What is assumed of shapes and mass is what the profile pours.
-    poured: Values = {"body.spheres": profile.spheres, **mass}
     assumed = tuple(replace(one, reference=poured.get(one.path, one.reference)) for one in study.assumptions)
     return replace(study, scene=scene, experiments=experiments, assumptions=assumed), profile
 

@@ -29,20 +29,20 @@ def read_yade(file: Path) -> Found:
         tree = ast.parse(text)
     except SyntaxError as error:
         raise CommandError(f"{file}: line {error.lineno}: is not Python: {error.msg}") from None
-    found = Found()
+    found, constants = Found(), _constants(tree)
     angles: Numbers = {}
     calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
     labels = _labels(tree)
     for call in sorted(calls, key=lambda node: (node.lineno, node.col_offset)):
         kind, words = called(call.func), _words(call)
         if kind == "FrictMat":
-            _frict_mat(file, found, angles, call, words, _constants(tree, call), labels)
+            _frict_mat(file, found, angles, call, words, constants(call), labels)
         elif kind.endswith("Mat") and kind[:1].isupper():
             found.notes.append(f"{kind} (line {call.lineno}): only FrictMat is taken")
     if not found.materials:
         return found
     for call in calls:
-        kind, words, names = called(call.func), _words(call), _constants(tree, call)
+        kind, words, names = called(call.func), _words(call), constants(call)
         if kind == "sphere" or kind in ("wall", "facet", "box"):
             _placed(found, kind, call, words, names)
         elif kind == "NewtonIntegrator" and isinstance(words.get("gravity"), ast.Tuple | ast.List):
@@ -53,7 +53,7 @@ def read_yade(file: Path) -> Found:
     _frictions(found, angles)
     for call in calls:
         if called(call.func).startswith("Ip2_"):
-            _functor(found, call, _constants(tree, call))
+            _functor(found, call, constants(call))
     found.notes.append("not taken: bodies' places, geometry, engines and time step of the script")
     return found
 
@@ -63,16 +63,19 @@ def _words(call: ast.Call) -> dict[str, ast.expr]:
     return {word.arg: word.value for word in call.keywords if word.arg}
 
 
-def _constants(tree: ast.Module, call: ast.Call) -> dict[str, float]:
-    """Names that stand for a number where ``call`` is made: the script's assignments above it, or for a call within a
-    function, which may run later, all of them."""
-    names: dict[str, float] = {}
-    holds = next((node for node in reversed(tree.body) if node.lineno <= call.lineno), None)
-    for node in tree.body:
-        above = (node.lineno, node.col_offset) < (call.lineno, call.col_offset)
-        if not above and not isinstance(holds, ast.FunctionDef | ast.ClassDef):
-            break
-        if isinstance(node, ast.Assign) and len(node.targets) == 1:
+def _constants(tree: ast.Module) -> Callable[[ast.Call], dict[str, float]]:
+    """Names that stand for a number where a call is made: the script's assignments above it, or for a call within a
+    function, which may run later, all of them.
+    """
+    assigned = [node for node in tree.body if isinstance(node, ast.Assign) and len(node.targets) == 1]
+    parts = [node for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)]
+    later = {id(inner) for part in parts for inner in ast.walk(part)}
+
+    def known(call: ast.Call) -> dict[str, float]:
+        names: dict[str, float] = {}
+        for node in assigned:
+            if id(call) not in later and (node.lineno, node.col_offset) >= (call.lineno, call.col_offset):
+                break
             target, value = node.targets[0], node.value
             pairs = [(target, value)]
             if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and len(target.elts) == len(value.elts):
@@ -83,7 +86,9 @@ def _constants(tree: ast.Module, call: ast.Call) -> dict[str, float]:
                         names[one.id] = number(expression, names)
                     except ValueError:
                         names.pop(one.id, None)
-    return names
+        return names
+
+    return known
 
 
 def _labels(tree: ast.Module) -> dict[int, str]:

@@ -207,11 +207,12 @@ def precision_cautions(target: Target, test: Verification) -> list[str]:
     found = []
     error, spread = test.relative_error_percent, test.simulated.standard_error
     name = observable_label(target.observable)
-    if target.mean != 0.0 and error < 100 * spread / abs(target.mean):
+    share = 100 * ratio(spread, abs(target.mean))
+    if error < share:
         found.append(
             f"{name[0].upper()}{name[1:]}: the relative error of {fixed(error)} % is smaller than the standard error "
             f"of the simulated mean, {observed(target.observable, spread)} = "
-            f"{fixed(100 * spread / abs(target.mean))} %. Pours this noisy cannot show an error this small."
+            f"{fixed(share)} %. Pours this noisy cannot show an error this small."
         )
     if target.sd is not None and target.sd_source != "measured":
         found.append(
