@@ -63,6 +63,8 @@ def read_liggghts(file: Path) -> Found:
     poured = {body["material"] for body in found.bodies.values()}
     free = [name for name in [*walls, *found.materials] if name not in poured and name in found.materials]
     found.wall = free[0] if free and poured else walls[0] if walls and walls[0] in found.materials else ""
+    if found.wall and len(set(walls)) > 1:
+        found.notes.append(f"walls of {', '.join(dict.fromkeys(walls))}: all are taken as {found.wall}")
     _model(found, model, rolling)
     found.notes.append("not taken: geometry, insertion, time step and output of the script")
     return found

@@ -107,6 +107,13 @@ def test_a_rolling_friction_without_a_model_does_not_act_in_liggghts(tmp_path):
     assert "coefficientRollingFriction: no rolling_friction in pair_style" in said
 
 
+def test_walls_of_two_types_are_taken_as_one_and_said(tmp_path):
+    side = "fix side all wall/gran model hertz tangential history primitive type 1 xplane 0.0\n"
+    scene, said = imported("liggghts", LIGGGHTS + side, tmp_path)
+    assert scene.rig.wall == "type2"
+    assert "walls of type2, type1: all are taken as type2" in said
+
+
 def test_a_liggghts_script_without_friction_says_that_here_it_acts(tmp_path):
     _, said = imported("liggghts", LIGGGHTS.replace("tangential history rolling", "tangential off rolling"), tmp_path)
     assert "tangential off: no counterpart; here friction acts" in said
