@@ -17,8 +17,12 @@ from __future__ import annotations
 import dataclasses
 import math
 import multiprocessing as mp
+import os
+import threading
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -134,13 +138,41 @@ _KNOWN: dict[tuple[str, str, str], float] = {}
 
 
 def plate_tests(asked: Sequence[PlateTest]) -> list[float]:
-    """Results of the tests, run in processes of their own; tests of equal scenes are run only once."""
+    """Results of the tests, run in processes of their own; tests of equal scenes are run only once.
+
+    The processes stay for the next tests, since starting one and tracing its kernels takes as long as fifty tests.
+
+    Raises BrokenProcessPool if one of them was killed.
+    """
     keys = [(pour_key(one.scene, 0), one.body, one.name) for one in asked]
     fresh = {key: one for key, one in zip(keys, asked, strict=True) if key not in _KNOWN}
     if fresh:
-        workers = min(available_cores(), len(fresh))
-        with deaf_to_interrupts(), script_left_alone():
-            pool = mp.get_context("spawn").Pool(workers, begin_worker)
-        with pool:
-            _KNOWN.update(zip(fresh, pool.imap(plate_test, list(fresh.values()), chunksize=1), strict=True))
+        workers = _workers()
+        try:
+            with deaf_to_interrupts(), script_left_alone():
+                results = workers.map(plate_test, fresh.values())
+            _KNOWN.update(zip(fresh, results, strict=True))
+        except BaseException:
+            # What waits is of no use; the next tests begin with new processes.
+            workers.shutdown(wait=False, cancel_futures=True)
+            _workers.cache_clear()
+            raise
     return [_KNOWN[key] for key in keys]
+
+
+@cache
+def _workers() -> ProcessPoolExecutor:
+    return ProcessPoolExecutor(available_cores(), mp.get_context("spawn"), _begin_worker)
+
+
+def _begin_worker() -> None:
+    begin_worker()
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End this process with the one in charge, even if that is killed: nothing else would tell it."""
+    in_charge = mp.parent_process()
+    assert in_charge is not None
+    in_charge.join()
+    os._exit(1)

@@ -1,7 +1,10 @@
 """Plate tests of single bodies against closed forms."""
 
 import math
-import multiprocessing as mp
+import os
+import select
+import subprocess
+import sys
 
 import pytest
 from scipy.optimize import brentq
@@ -94,5 +97,42 @@ def test_tests_run_in_processes_of_their_own_and_once(monkeypatch):
     asked = [PlateTest(scene, "bead", name) for name in (KINETIC, RESTITUTION, KINETIC)]
     first = plate_tests(asked)
     assert first[0] == first[2] == pytest.approx(0.37, rel=1e-3)
-    monkeypatch.setattr(mp, "get_context", lambda name: pytest.fail("they were run before"))
+    monkeypatch.setattr("solver.single_body.plate_tests._workers", lambda: pytest.fail("they were run before"))
     assert plate_tests(asked) == first
+
+
+KILLED = """
+import multiprocessing as mp, os, signal, sys, time
+from concurrent.futures.process import BrokenProcessPool
+from solver import PlateTest, plate_tests
+from tests.explorer.beads import bead_scene
+
+def test(name):
+    return plate_tests([PlateTest(bead_scene(), "bead", name)])
+
+test("restitution")
+for child in mp.active_children():
+    os.kill(child.pid, signal.SIGKILL)
+try:
+    test("apparent_static_friction")
+    test("apparent_kinetic_friction")
+except BrokenProcessPool:
+    print("broken", *test("apparent_static_friction"), *test("apparent_kinetic_friction"))
+print(*[child.pid for child in mp.active_children()], flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.mark.slow
+def test_a_killed_process_is_replaced_and_none_outlives_the_one_in_charge():
+    with subprocess.Popen(
+        [sys.executable, "-c", KILLED], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as program:
+        said = program.stdout.readline().split()
+        assert said[0] == "broken"
+        assert [float(x) for x in said[1:]] == pytest.approx([0.3, 0.3], rel=3e-3)
+        children = [os.pidfd_open(int(pid)) for pid in program.stdout.readline().split()]
+        assert children
+        program.kill()
+    for child in children:
+        assert select.select([child], [], [], 60.0)[0], "a process outlives the one in charge"
