@@ -34,7 +34,7 @@ from scipy.optimize import minimize
 
 from doe.analysis.joint_posterior import least_error
 from doe.analysis.level_set import REFINEMENTS, crossings, extremes, nearest_points
-from doe.analysis.surface import Surface, fitted_coefficients
+from doe.analysis.surface import Surface, fitted_coefficients, quadratic_form
 from doe.analysis.surface_anova import analyse_surface
 from doe.errors import StatisticsError
 from doe.record import Record
@@ -217,15 +217,19 @@ def find_compromise(models: Sequence[Surface], targets: Sequence[Target], refere
     weight = np.array([t.weight for t in targets])
     goal = np.array([t.mean for t in targets])
 
-    def residuals(x: FloatArray) -> FloatArray:
-        predicted = np.array([float(m.predict(x[None])[0]) for m in models])
-        return (predicted - goal) / spread
+    level, slope, curvature = quadratic_form(np.array([m.coefficients for m in models]), k)
 
-    def cost(x: FloatArray) -> float:
-        return float(weight @ residuals(x) ** 2 + TIE * ((x - home) ** 2).sum())
+    def residuals(x: FloatArray) -> FloatArray:
+        return np.asarray((level + slope @ x + curvature @ x @ x - goal) / spread)
+
+    def cost(x: FloatArray) -> tuple[float, FloatArray]:
+        """J with the tie-breaker, and its gradient."""
+        missed, away = residuals(x), x - home
+        rise = (slope + 2.0 * curvature @ x) / spread[:, None]
+        return float(weight @ missed**2 + TIE * away @ away), 2.0 * ((weight * missed) @ rise + TIE * away)
 
     starts = [np.array(x, dtype=float) for x in product((-0.9, 0.0, 0.9), repeat=k)]
-    best = min((minimize(cost, x, bounds=[(-1.0, 1.0)] * k) for x in starts), key=lambda found: found.fun)
+    best = min((minimize(cost, x, jac=True, bounds=[(-1.0, 1.0)] * k) for x in starts), key=lambda found: found.fun)
     missed = residuals(best.x)
     misfit = float(weight @ missed**2)
     worst = int(np.argmax(np.abs(missed)))

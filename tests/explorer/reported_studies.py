@@ -4,6 +4,7 @@ And what a reader sees of a report: the text of its page, the tables of its Mark
 """
 
 import dataclasses
+import functools
 import json
 import re
 
@@ -62,10 +63,15 @@ CASES = {
 
 
 def result_of_case(name):
-    """The content of result.json, as a reader of the file finds it."""
+    """The content of result.json, as a reader of the file finds it; a copy, which a test may change."""
+    return json.loads(_text_of_case(name))
+
+
+@functools.cache
+def _text_of_case(name):
     study, profile, runner = CASES[name]
     result = result_of(study, profile, run_campaign(study, profile, runner, BIAS), 912.5)
-    return json.loads(json.dumps(result.to_dict(), allow_nan=False))
+    return json.dumps(result.to_dict(), allow_nan=False)
 
 
 def typed(result):
