@@ -19,6 +19,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable
+from functools import cache
 from multiprocessing.util import Finalize
 from pathlib import Path
 
@@ -26,9 +27,13 @@ os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 # Taichi would ask its makers once a day whether there is a newer one, and tell them system, Python and a number that
 # stands for this user.
 os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
+# Where standard output is not the terminal's, as in a notebook or a test, every kernel would fetch what it may have
+# printed: a third of the time of short launches. None here prints.
+os.environ.setdefault("TI_ENABLE_PYBUF", "0")
 
 import taichi as ti
-from taichi.lang import impl
+from taichi.lang import impl, kernel_impl
+from taichi.lang.ast import checkers
 from taichi.lang.ast.ast_transformer_utils import ASTTransformerContext
 
 from solver.arch import chosen
@@ -57,6 +62,10 @@ def _place(context: ASTTransformerContext, node: ast.expr | ast.stmt) -> str:
 
 
 ASTTransformerContext.get_pos_info = _place
+# Taichi looks for a function's source at each of its calls, and at the dates of all files read so far each time.
+for module in (kernel_impl, checkers):
+    module.getsourcefile = cache(module.getsourcefile)
+    module.getsourcelines = cache(module.getsourcelines)
 
 _owner: int | None = None
 _written = 0.0

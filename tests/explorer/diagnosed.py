@@ -7,6 +7,7 @@ made: the pours that teach, the data and the fresh pours are drawn from the same
 ``twisting`` have almost the same signature, ``air_drag`` hardly any. Only the first condition has a scan.
 """
 
+import functools
 import json
 import math
 from pathlib import Path
@@ -318,11 +319,16 @@ EXPECTED = {
 
 
 def result_of_case(name):
-    """What the report gets: the content of diagnosis.json, read back as a reader of the file would."""
+    """What the report gets: the content of diagnosis.json, read back as a reader of the file would; a copy."""
+    return json.loads(_text_of_case(name))
+
+
+@functools.cache
+def _text_of_case(name):
     measurement, found = diagnosed(**CASES[name])
     order = DiagnoseOrder(measurement.folder, Path("results/made up"), budget=900)
     result = result_of(measurement, order, {}, found, 912.5)
-    return json.loads(json.dumps(result.to_dict(), allow_nan=False))
+    return json.dumps(result.to_dict(), allow_nan=False)
 
 
 def typed(content):

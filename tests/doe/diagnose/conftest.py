@@ -9,10 +9,15 @@ from solver.assets import measurement_folder
 from tests.doe.diagnose.test_loop import NAMES, FormulaPours
 
 
+@pytest.fixture(scope="session")
+def trefoil_1():
+    """The shipped data set, whose piles take a second to read."""
+    return load_measurement(measurement_folder("trefoil_1"))
+
+
 @pytest.fixture
-def measurement(monkeypatch):
-    """The shipped data set ``trefoil_1``, diagnosed by pours that a formula stands for."""
+def measurement(monkeypatch, trefoil_1):
+    """``trefoil_1``, diagnosed by pours that a formula stands for."""
     monkeypatch.setattr(diagnosis, "ModelPours", FormulaPours)
-    found = load_measurement(measurement_folder("trefoil_1"))
-    monkeypatch.setattr(FormulaPours, "declared", declare(found, NAMES))
-    return found
+    monkeypatch.setattr(FormulaPours, "declared", declare(trefoil_1, NAMES))
+    return trefoil_1
