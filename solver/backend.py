@@ -19,9 +19,10 @@ import threading
 import time
 import warnings
 from collections.abc import Callable
-from functools import cache
 from multiprocessing.util import Finalize
 from pathlib import Path
+from types import CodeType, FunctionType
+from typing import Any
 
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 # Taichi would ask its makers once a day whether there is a newer one, and tell them system, Python and a number that
@@ -61,11 +62,25 @@ def _place(context: ASTTransformerContext, node: ast.expr | ast.stmt) -> str:
     return f'File "{context.file}", line {line + context.lineno_offset}, in {name}:\n{context.src[line - 1]}\n'
 
 
+def _read_once(read: Callable[[FunctionType], Any]) -> Callable[[FunctionType], Any]:
+    """``read``, once for all functions of the same source."""
+    known: dict[tuple[CodeType, str], Any] = {}
+
+    def kept(function: FunctionType) -> Any:
+        key = function.__code__, function.__code__.co_filename
+        if key not in known:
+            known[key] = read(function)
+        return known[key]
+
+    return kept
+
+
 ASTTransformerContext.get_pos_info = _place
-# Taichi looks for a function's source at each of its calls, and at the dates of all files read so far each time.
+# Taichi asks for a function's source wherever a kernel calls it, and each time Python looks whether any file has changed
+# that it has read so far.
 for module in (kernel_impl, checkers):
-    module.getsourcefile = cache(module.getsourcefile)
-    module.getsourcelines = cache(module.getsourcelines)
+    module.getsourcefile = _read_once(module.getsourcefile)
+    module.getsourcelines = _read_once(module.getsourcelines)
 
 _owner: int | None = None
 _written = 0.0

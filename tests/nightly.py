@@ -48,11 +48,17 @@ PARTS = {
     "exports and laboratory": Part((*SLOW, "tests/explorer/export/test_paraview.py", "tests/explorer/laboratory")),
     "validation campaign, small": Part((*SLOW, "tests/doe/validation")),
     "other engines, short": Part((*PYTEST, "-m", "slow or not slow", "tests/peers/test_short_pour.py")),
-    "commands and plug-ins": Part(
+    "statistics, reports and commands": Part(
         (
-            *SLOW,
-            "tests/explorer/commands/test_limit.py",
-            "tests/explorer/study/test_ci_example.py",
+            *BOTH_CORES,
+            "loadfile",
+            "tests/doe/analysis",
+            "tests/doe/test_store.py",
+            "tests/explorer/commands",
+            "tests/explorer/photograph",
+            "tests/explorer/recordings",
+            "tests/explorer/report",
+            "tests/explorer/study",
             "tests/test_plugins.py",
         )
     ),

@@ -96,8 +96,8 @@ def read_observations(
             observations.append(observation)
         elif observable not in piles | photographs | profile:
             raise MeasurementError(
-                f"{table_path}: {observable}: {_lack(observation, 'one replicate has no scatter')}; allowed: two or more "
-                f"replicates, or {observable} in [uncertainty]"
+                f"{table_path}: {observable}: {_lack(observation, 'one replicate has no scatter')}; allowed: two or "
+                f"more replicates, or {observable} in [uncertainty]"
             )
     ordered = tuple(sorted(observations, key=lambda observation: observation.observable))
     return replicates, ordered, tuple(checks), tuple(ignored)

@@ -212,6 +212,7 @@ def opened(path):
     return True
 
 
+@pytest.mark.slow
 def test_many_processes_may_make_a_store_at_once(tmp_path):
     """Four at a time, six times: whoever comes second waits, and none fails."""
     with mp.get_context("spawn").Pool(4) as pool:

@@ -75,6 +75,7 @@ def test_an_unreachable_target_is_said_with_the_nearest_value(target, corner):
     assert np.isnan(found.solution_low).all()
 
 
+@pytest.mark.slow
 def test_the_bootstrap_interval_covers_the_true_point_at_about_its_level():
     """20 studies: the true nearest solution lies in the 95 % interval of each factor in at least 70 % of
     them.

@@ -87,6 +87,7 @@ def test_the_body_file_is_poured_as_the_mesh(rod, taichi, tmp_path):
     assert poured.exit_code == 0, poured.output
 
 
+@pytest.mark.slow
 def test_the_fewest_are_searched_between_the_powers_of_two(rod):
     result = explorer("shape", rod, "--most", 16, "--error", "0.135mm")
     assert result.exit_code == 0, result.output

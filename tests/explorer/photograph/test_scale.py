@@ -28,7 +28,7 @@ def seen_through(k, shape):
 
 
 @pytest.mark.parametrize("known", [False, True], ids=["found from the base line", "by a checkerboard"])
-@pytest.mark.parametrize("k", [-0.1, 0.1])
+@pytest.mark.parametrize("k", [pytest.param(-0.1, marks=pytest.mark.slow), 0.1])
 def test_a_bar_is_measured_in_the_straight_picture(k, known):
     stage = Stage(30.0)
     plain = _reading(picture_of(staged(stage, LOOK)), order(BAR), None)

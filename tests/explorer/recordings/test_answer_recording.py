@@ -101,6 +101,7 @@ def answered(taichi, result, data):
     return out, path
 
 
+@pytest.mark.slow
 def test_both_models_are_recorded_as_a_direct_pour_of_them_goes(answered, data):
     condition = load_measurement(data).fit[0]
     parameters = {one.path: one.mean for one in load_measurement(data).parameters}

@@ -131,6 +131,7 @@ def test_a_missing_number_is_an_empty_cell():
 # Figures for print
 
 
+@pytest.mark.slow
 def test_every_chart_can_be_printed_at_both_widths_without_loss(specs):
     for name, spec in specs.items():
         for width in WIDTHS:

@@ -52,6 +52,7 @@ def test_every_memory_is_in_use(whole):
     assert np.abs(memory[:, COUPLE:]).max(axis=0).min() > 0.0
 
 
+@pytest.mark.slow
 def test_the_same_bits_in_another_slot_among_other_worlds(whole):
     """Two threads share three worlds, one of them with weaker effects and one with none."""
     _, row, bodies = whole

@@ -125,6 +125,7 @@ def test_adhesion_vanishes_for_contacts_that_share_their_stiffness():
     assert landed("local_mass_shared", faint) == pytest.approx(landed("local_mass_shared"), abs=1e-3)
 
 
+@pytest.mark.slow
 def test_adhesion_goes_on_where_surfaces_that_share_their_stiffness_come_apart():
     """The force of the plane on a slab of 25 spheres an atom's width on either side of touching."""
     scene = with_effects(grain_on_plate(slab(), friction=0.0), EFFECTS["adhesion_jkr"](1.0))

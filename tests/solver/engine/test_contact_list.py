@@ -170,6 +170,7 @@ def test_no_contact_is_missed_while_bodies_of_different_sizes_fly_into_each_othe
     assert lab.run(1)["rebuilds"] > 20
 
 
+@pytest.mark.slow
 def test_a_list_that_did_not_fit_once_is_told_though_the_next_one_fits():
     """Two spheres reach a third at once, where one entry has room, pass through, and part."""
     pairs = (Pair("grain", "grain", 0.0, 1.0), Pair("grain", "wall", 0.0, 1.0))

@@ -94,6 +94,7 @@ def test_a_contact_list_of_any_reach(alone, skin):
     assert digest(record) == alone
 
 
+@pytest.mark.slow
 def test_a_contact_list_of_any_reach_with_every_effect():
     """What effects keep of a sleeping contact stays as it is, too."""
     scene = with_values(all_felt(HEAP), {"numerics.max_time": "1.2s"})

@@ -96,6 +96,7 @@ def test_skin_changes_no_bit():
     assert np.array_equal(records[0].bodies.quaternion, records[1].bodies.quaternion)
 
 
+@pytest.mark.slow
 def test_a_list_that_does_not_fit_is_built_with_narrow_margins():
     """A crowd that flies as one: nobody comes nearer, and yet every margin is wide."""
     lab = FreeWorld(grain_on_plate(), 1, plate=False)

@@ -51,6 +51,7 @@ def test_a_pour_comes_to_rest_with_its_mass_on_the_plate(finished):
     assert finished.trace.max_overlap.max() < 0.1
 
 
+@pytest.mark.slow
 def test_same_seed_same_bits_whatever_the_batch(finished):
     """Another slot, other worlds beside it, other launches: not a bit may change."""
     other = with_values(QUICK, {"pair.seed.seed.static_friction": 0.2})

@@ -37,7 +37,7 @@ def test_doubling():
     assert doubling(9) == [1, 2, 4, 8, 9]
 
 
-@pytest.mark.parametrize("name", ["ring", "bend"])
+@pytest.mark.parametrize("name", [pytest.param("ring", marks=pytest.mark.slow), "bend"])
 def test_sixteen_spheres_follow_a_rod_that_is_not_straight(solids, fits, name):
     """Spheres of radius r in a row, a apart, leave grooves of r − √(r² − a²/4).
 
