@@ -76,8 +76,8 @@ def _read_once(read: Callable[[FunctionType], Any]) -> Callable[[FunctionType], 
 
 
 ASTTransformerContext.get_pos_info = _place
-# Taichi asks for a function's source wherever a kernel calls it, and each time Python looks whether any file has changed
-# that it has read so far.
+# Taichi asks for a function's source wherever a kernel calls it, and Python then looks whether any file that it has
+# read so far has changed.
 for module in (kernel_impl, checkers):
     module.getsourcefile = _read_once(module.getsourcefile)
     module.getsourcelines = _read_once(module.getsourcelines)

@@ -4,10 +4,8 @@ import sys
 from pathlib import Path
 
 import pytest
-import taichi as ti
-from taichi.lang import shell
 
-from solver.backend import _read_once
+from solver.backend import _read_once, ti
 
 
 def test_a_mistake_in_a_kernel_is_named_with_file_and_line(taichi):
@@ -28,7 +26,7 @@ def test_a_mistake_in_a_kernel_is_named_with_file_and_line(taichi):
 def test_no_launch_fetches_what_a_kernel_may_have_printed(taichi):
     """Tests, like notebooks, replace standard output, which Taichi takes for a reason to do so after each launch."""
     assert sys.stdout is not sys.__stdout__
-    assert not shell.pybuf_enabled
+    assert not ti.lang.shell.pybuf_enabled
 
 
 def test_functions_of_one_source_are_read_once_and_others_are_not_mixed_up():
