@@ -9,6 +9,7 @@ is killed in its first minute would compile again for ever. So :func:`keep_compi
 
 import ast
 import contextlib
+import inspect
 import io
 import os
 import select
@@ -28,7 +29,7 @@ os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 # Taichi would ask its makers once a day whether there is a newer one, and tell them system, Python and a number that
 # stands for this user.
 os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
-# Where standard output is not the terminal's, as in a notebook or a test, every kernel would fetch what it may have
+# Where `sys.stdout` has been replaced, as in a notebook or a test, each launch would fetch what its kernel may have
 # printed: a third of the time of short launches. None here prints.
 os.environ.setdefault("TI_ENABLE_PYBUF", "0")
 
@@ -63,21 +64,24 @@ def _place(context: ASTTransformerContext, node: ast.expr | ast.stmt) -> str:
 
 
 def _read_once(read: Callable[[FunctionType], Any]) -> Callable[[FunctionType], Any]:
-    """``read``, once for all functions of the same source."""
-    known: dict[tuple[CodeType, str], Any] = {}
+    """``read``, once for all functions that are made of the same code."""
+    known: dict[tuple[int, int], tuple[CodeType, CodeType, Any]] = {}
 
     def kept(function: FunctionType) -> Any:
-        key = function.__code__, function.__code__.co_filename
+        # Python takes two codes for equal that differ in their annotations, and Taichi obeys these. `read` looks
+        # behind a wrapper, whose own code many functions share.
+        code, behind = function.__code__, inspect.unwrap(function).__code__
+        key = id(code), id(behind)
         if key not in known:
-            known[key] = read(function)
-        return known[key]
+            known[key] = code, behind, read(function)  # as long as they are kept, no other code has these numbers
+        return known[key][2]
 
     return kept
 
 
 ASTTransformerContext.get_pos_info = _place
-# Taichi asks for a function's source wherever a kernel calls it, and Python then looks whether any file that it has
-# read so far has changed.
+# Taichi asks for a function's source wherever a kernel calls it, and Python then looks whether its file has changed and
+# where the function ends.
 for module in (kernel_impl, checkers):
     module.getsourcefile = _read_once(module.getsourcefile)
     module.getsourcelines = _read_once(module.getsourcelines)

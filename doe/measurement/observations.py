@@ -84,9 +84,9 @@ def read_observations(
             if _has_spread(observation):
                 observations.append(observation)
             else:
-                ignored.append(
-                    f"{name}: {observable} from {origin}: {_lack(observation, 'one replicate and no [uncertainty]')}"
-                )
+                some = any(_measured(observation.values))
+                lack = "one replicate and no [uncertainty]" if some else "no replicate has a value"
+                ignored.append(f"{name}: {observable} from {origin}: {lack}")
     taken = {observation.observable for observation in observations}
     for observable, (x, values) in stated.items():
         if observable in taken:
@@ -96,8 +96,8 @@ def read_observations(
             observations.append(observation)
         elif observable not in piles | photographs | profile:
             raise MeasurementError(
-                f"{table_path}: {observable}: {_lack(observation, 'one replicate has no scatter')}; allowed: two or "
-                f"more replicates, or {observable} in [uncertainty]"
+                f"{table_path}: {observable}: one replicate has no scatter; allowed: two or more replicates, or "
+                f"{observable} in [uncertainty]"
             )
     ordered = tuple(sorted(observations, key=lambda observation: observation.observable))
     return replicates, ordered, tuple(checks), tuple(ignored)
@@ -161,11 +161,6 @@ def _observation(
 def _has_spread(observation: Observation) -> bool:
     """True if at least two replicates have a value, or one has and its uncertainty is stated."""
     return sum(_measured(observation.values)) >= (2 if observation.uncertainty is None else 1)
-
-
-def _lack(observation: Observation, of_one: str) -> str:
-    """Why an observation has no spread; ``of_one``: said of a single value."""
-    return of_one if any(_measured(observation.values)) else "no replicate has a value"
 
 
 def _measured(values: Array) -> Iterator[bool]:

@@ -14,6 +14,7 @@ square of the time since its onset, which is where √v, over the logarithm of t
 
 from __future__ import annotations
 
+import _thread
 import dataclasses
 import math
 import multiprocessing as mp
@@ -21,8 +22,10 @@ import os
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import cache
+from multiprocessing.util import Finalize
 
 import numpy as np
 
@@ -52,6 +55,8 @@ SLIDES, SLOWER, LOOKS = 0.15, 0.05, 10
 """Speeds [m/s] between which a sliding body is watched, and number of readings between them."""
 LONGEST = 1.0
 """Longest time for which a sliding body is watched [s]."""
+MOST_WORKERS = 61
+"""Windows cannot wait for more processes."""
 
 
 @dataclass(frozen=True)
@@ -135,6 +140,7 @@ def plate_test(asked: PlateTest) -> float:
 
 _KNOWN: dict[tuple[str, str, str], float] = {}
 """Results so far, by the key of the scene, body and test."""
+_ONE_AT_A_TIME = threading.Lock()
 
 
 def plate_tests(asked: Sequence[PlateTest]) -> list[float]:
@@ -142,32 +148,48 @@ def plate_tests(asked: Sequence[PlateTest]) -> list[float]:
 
     The processes stay for the next tests, since starting one and tracing its kernels takes as long as fifty tests.
 
-    Raises BrokenProcessPool if one of them was killed.
+    Raises BrokenProcessPool if a process was killed and another in its place as well.
     """
     keys = [(pour_key(one.scene, 0), one.body, one.name) for one in asked]
-    fresh = {key: one for key, one in zip(keys, asked, strict=True) if key not in _KNOWN}
-    if fresh:
-        workers = _workers()
-        try:
-            with deaf_to_interrupts(), script_left_alone():
-                results = workers.map(plate_test, fresh.values())
+    with _ONE_AT_A_TIME:
+        fresh = {key: one for key, one in zip(keys, asked, strict=True) if key not in _KNOWN}
+        if fresh:
+            try:
+                results = _run(list(fresh.values()))
+            except BrokenProcessPool:  # perhaps it was killed long ago, while it waited
+                results = _run(list(fresh.values()))
             _KNOWN.update(zip(fresh, results, strict=True))
-        except BaseException:
-            # What waits is of no use; the next tests begin with new processes.
-            workers.shutdown(wait=False, cancel_futures=True)
-            _workers.cache_clear()
-            raise
-    return [_KNOWN[key] for key in keys]
+        return [_KNOWN[key] for key in keys]
+
+
+def _run(tests: Sequence[PlateTest]) -> list[float]:
+    workers = _workers()
+    try:
+        with deaf_to_interrupts(), script_left_alone():
+            results = workers.map(plate_test, tests)
+        return list(results)
+    except BaseException:
+        # What still runs is of no use; the next tests begin with new processes.
+        _workers.cache_clear()
+        processes = list((workers._processes or {}).values())
+        workers.shutdown(wait=False, cancel_futures=True)
+        for process in processes:
+            process.kill()
+        raise
 
 
 @cache
 def _workers() -> ProcessPoolExecutor:
-    return ProcessPoolExecutor(available_cores(), mp.get_context("spawn"), _begin_worker)
+    workers = ProcessPoolExecutor(min(available_cores(), MOST_WORKERS), mp.get_context("spawn"), _begin_worker)
+    # A process that is itself a child waits for its children before it ends threads, and would wait for these for ever.
+    Finalize(None, workers.shutdown, exitpriority=100)
+    return workers
 
 
 def _begin_worker() -> None:
     begin_worker()
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    # Not as a `threading.Thread`: kernels are kept by a process with one of these only.
+    _thread.start_new_thread(_end_with_parent, ())
 
 
 def _end_with_parent() -> None:

@@ -1,6 +1,8 @@
 """The chosen optimum: nearest to the reference, honest about what the target leaves open."""
 
 import json
+import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -186,6 +188,24 @@ def test_a_compromise_counts_misses_by_what_is_known_of_both_sides():
     assert found.standardised == pytest.approx(missed / np.sqrt(s2))
     assert found.misfit == pytest.approx((missed**2 / s2).sum())
     assert found.desirability == pytest.approx(1.0 - np.abs(missed) / [1.0, 0.5])
+
+
+def test_a_compromise_between_bent_surfaces_is_the_best_of_a_grid():
+    """Factors interact, and five targets are more than three factors can meet."""
+    weights = np.array([1.0, 3.0, 2.0, 1.0, 2.0])
+    models = [surface(0.3, 3, (24.0 + k, *np.random.default_rng(k).normal(0.0, 3.0, 9)), k) for k in range(5)]
+    targets = [Target(f"y{k}", 24.0 + 3.0 * (-1) ** k, 1.0, 5, weight=weights[k]) for k in range(5)]
+    found = find_compromise(models, targets, [50.0, 0.6, 0.6])
+    spread = [math.hypot(t.standard_error, m.standard_error(np.zeros(3))) for m, t in zip(models, targets, strict=True)]
+    middle, reach = np.zeros(3), 1.0
+    for _ in range(3):
+        grid = np.clip(middle + reach * np.array(list(product(np.linspace(-1.0, 1.0, 31), repeat=3))), -1.0, 1.0)
+        missed = [(m.predict(grid) - t.mean) / s for m, t, s in zip(models, targets, spread, strict=True)]
+        misfits = weights @ np.square(missed)
+        middle, reach = grid[misfits.argmin()], reach / 10.0
+    # The tie-breaker costs a thousandth.
+    assert 10.0 < found.misfit == pytest.approx(misfits.min(), abs=2e-3)
+    assert found.point_coded == pytest.approx(middle, abs=2e-3)
 
 
 def test_a_surface_of_noise_is_no_calibration():

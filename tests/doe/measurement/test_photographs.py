@@ -51,6 +51,15 @@ def test_where_one_picture_has_no_scatter_the_table_is_taken(tmp_path):
     assert measurement.ignored == ("slow: angle_of_repose_deg@0 from photographs: one replicate and no [uncertainty]",)
 
 
+def test_piles_too_flat_for_an_angle_are_said_to_give_none(tmp_path):
+    folder = write(tmp_path)
+    for replicate in (1, 2):
+        write_pile(folder / f"piles/slow_{replicate}.npz", beads=1)
+    measurement = load_measurement(folder)
+    assert "slow: angle_of_repose_deg from piles: no replicate has a value" in measurement.ignored
+    assert measurement.conditions[0].offered["angle_of_repose_deg"].origin == "table"
+
+
 def test_a_gap_between_piles_is_named_whatever_pictures_there_are(tmp_path):
     folder = pictured(tmp_path, '[{ file = "a.png", replicate = 5 }]')
     write_pile(folder / "piles" / "slow_4.npz")

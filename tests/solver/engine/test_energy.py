@@ -173,7 +173,6 @@ def drum(taichi):
     return columns, put_in
 
 
-@pytest.mark.slow
 def test_the_account_closes_with_walls_that_turn_and_stop(drum):
     samples, put_in = drum
     assert samples["asleep"][SETTLED - 1] == 24
