@@ -82,9 +82,8 @@ def _read_once(read: Callable[[FunctionType], Any]) -> Callable[[FunctionType], 
 ASTTransformerContext.get_pos_info = _place
 # Taichi asks for a function's source wherever a kernel calls it, and Python then looks whether its file has changed and
 # where the function ends.
-for module in (kernel_impl, checkers):
-    module.getsourcefile = _read_once(module.getsourcefile)
-    module.getsourcelines = _read_once(module.getsourcelines)
+kernel_impl.getsourcefile = checkers.getsourcefile = _read_once(kernel_impl.getsourcefile)
+kernel_impl.getsourcelines = checkers.getsourcelines = _read_once(kernel_impl.getsourcelines)
 
 _owner: int | None = None
 _written = 0.0

@@ -143,7 +143,7 @@ def test_tests_begin_again_where_a_process_was_killed_but_only_once(monkeypatch)
 
 
 KILLED = """
-import multiprocessing as mp, os, signal, sys, time
+import multiprocessing as mp, os, signal, sys
 from solver import PlateTest, plate_tests
 from tests.explorer.beads import bead_scene
 
