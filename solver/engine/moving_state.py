@@ -1,4 +1,4 @@
-"""What changes in a running world, as one row of numbers: a faster alternative to ``solver/engine/snapshot.py``.
+"""What changes in a running world, as one row of numbers; ``solver/engine/snapshot.py`` gives it names.
 
 A row can be restored only to the slot from which it was taken, in a batch of the same capacity; what is loaded once and
 never changes (masses, shapes, surfaces) is not in it. Integers of 32 bits are exact in double precision.
@@ -28,6 +28,14 @@ LOADED_ONCE = frozenset(
 """Fields of bodies and members that are written only when a scene is loaded."""
 SCRATCH = frozenset(("near", "next"))
 """Fields of bodies that the list build fills before it reads them."""
+GROUPS = {
+    "body": tuple(name for name in BODY if name not in LOADED_ONCE | SCRATCH),
+    "member": tuple(name for name in MEMBER if name not in LOADED_ONCE),
+    "contact": tuple(CONTACT),
+    "wall": tuple(WALL),
+    "candidate": ("triangle",),
+}
+"""Groups of a row, each with its fields, in their order."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +49,7 @@ class Moving:
     world: Array
     """Fields that exist once per world."""
     row: Array
-    """Bodies, members, contacts, walls, candidates, and the effects' memory of contacts if ``effects``."""
+    """The groups of ``GROUPS``, and the effects' memory of contacts if ``effects``."""
     effects: bool
 
     @property
@@ -51,28 +59,40 @@ class Moving:
 
 
 @dataclass(frozen=True)
-class _Section:
+class Section:
+    """The part of a row that holds one group, entry by entry."""
+
+    group: str
     fields: tuple[Any, ...]
     entries: int
-    width: int
     first: int
 
     @property
+    def width(self) -> int:
+        """Columns per entry."""
+        return _width(self.fields)
+
+    @property
     def end(self) -> int:
+        """Index behind the section."""
         return self.first + self.entries * self.width
+
+    def table(self, row: Array) -> Array:
+        """Its part of ``row``, shape (entries, width)."""
+        return row[self.first : self.end].reshape(self.entries, self.width)
 
 
 def take(state: Any, w: int, bodies: int, members: int) -> Moving:
     """Changing state of world ``w``, for which ``bodies`` bodies with ``members`` spheres in total have been loaded."""
-    once = _world_fields(state)
+    once = world_fields(state)
     world = np.empty(_width(once))
     transfer.pack_world(once, w, world)
-    sections = _sections(state, world, bodies, members)
-    contacts, end = sections[2].entries, sections[-1].end
+    parts = sections(state, world, bodies, members)
+    contacts, end = _contacts(parts).entries, parts[-1].end
     columns = state.memory.number.shape[2] if state.effects else 0
     row = np.empty(end + contacts * columns)
-    for section in sections:
-        transfer.pack(section.fields, w, section.entries, section.width, section.first, row)
+    for part in parts:
+        transfer.pack(part.fields, w, part.entries, part.width, part.first, row)
     if state.effects:
         transfer.pack_memory(state.memory.number, w, contacts, end, row)
     return Moving(bodies, members, world, row, bool(state.effects))
@@ -80,66 +100,63 @@ def take(state: Any, w: int, bodies: int, members: int) -> Moving:
 
 def put(state: Any, w: int, kept: Moving) -> None:
     """Restore world ``w`` to the state that :func:`take` saved."""
-    transfer.unpack_world(_world_fields(state), w, kept.world)
-    sections = _sections(state, kept.world, kept.bodies, kept.members)
-    for section in sections:
-        transfer.unpack(section.fields, w, section.entries, section.width, section.first, kept.row)
+    transfer.unpack_world(world_fields(state), w, kept.world)
+    parts = sections(state, kept.world, kept.bodies, kept.members)
+    for part in parts:
+        transfer.unpack(part.fields, w, part.entries, part.width, part.first, kept.row)
     if state.effects:
-        contacts, end = sections[2].entries, sections[-1].end
-        row = kept.row if kept.effects else np.append(kept.row, _memory_without_effects(state, kept.row, sections[2]))
-        transfer.unpack_memory(state.memory.number, w, contacts, end, row)
+        contacts, end = _contacts(parts), parts[-1].end
+        row = kept.row if kept.effects else np.append(kept.row, _memory_without_effects(state, kept.row, contacts))
+        transfer.unpack_memory(state.memory.number, w, contacts.entries, end, row)
     if state.sharing:
         # The list build determines which entries belong to one pair.
         state.world.outdated[w] = 1
 
 
-def _memory_without_effects(state: Any, row: Array, contacts: _Section) -> Array:
-    """Effects' memory of contacts saved without effects: zero except for the contact radii, which are Hertz's."""
-    table = row[contacts.first : contacts.end].reshape(contacts.entries, contacts.width)
-    before = tuple(CONTACT)[: tuple(CONTACT).index("radius")]
-    memory = np.zeros((contacts.entries, state.memory.number.shape[2]))
-    memory[:, HERTZ] = table[:, _width(tuple(getattr(state.contact, name) for name in before))]
-    return memory.ravel()
+def sections(state: Any, world: Array, bodies: int, members: int) -> list[Section]:
+    """Sections of a row, in the order of ``GROUPS``; ``world`` contains how many contacts, walls … are in use."""
+    used = (int(world[_world_column(state, name)]) for name in ("contacts", "walls", "candidates"))
+    parts, first = [], 0
+    for group, entries in zip(GROUPS, (bodies, members, *used), strict=True):
+        part = Section(group, group_fields(state, group), entries, first)
+        parts.append(part)
+        first = part.end
+    return parts
 
 
 @cache  # Kernels are compiled anew for every tuple, so each tuple is made once; the arrays of a batch are never freed.
-def _world_fields(state: Any) -> tuple[Any, ...]:
+def world_fields(state: Any) -> tuple[Any, ...]:
+    """Fields that exist once per world, in the order of ``WORLD``."""
     return tuple(getattr(state.world, name) for name in WORLD)
 
 
-def _sections(state: Any, world: Array, bodies: int, members: int) -> list[_Section]:
-    """Bodies, members, contacts, walls and candidates, in this order; ``world`` contains how many are in use."""
-    contacts, walls, candidates = (
-        int(world[_world_column(state, name)]) for name in ("contacts", "walls", "candidates")
-    )
-    sections, first = [], 0
-    for fields, entries in zip(_groups(state), (bodies, members, contacts, walls, candidates), strict=True):
-        section = _Section(fields, entries, _width(fields), first)
-        sections.append(section)
-        first = section.end
-    return sections
-
-
 @cache
-def _groups(state: Any) -> tuple[tuple[Any, ...], ...]:
-    return (
-        _moving_fields(state.body, BODY),
-        _moving_fields(state.member, MEMBER),
-        tuple(getattr(state.contact, name) for name in CONTACT),
-        tuple(getattr(state.wall, name) for name in WALL),
-        (state.candidate.triangle,),
-    )
+def group_fields(state: Any, group: str) -> tuple[Any, ...]:
+    """Fields of a group of ``GROUPS``."""
+    return tuple(getattr(getattr(state, group), name) for name in GROUPS[group])
 
 
-def _moving_fields(group: Any, table: dict[str, Any]) -> tuple[Any, ...]:
-    return tuple(getattr(group, name) for name in table if name not in LOADED_ONCE | SCRATCH)
+def columns_of(field: Any) -> int:
+    """Number of columns that one entry of ``field`` takes."""
+    return int(getattr(field, "n", 1) * getattr(field, "m", 1))
+
+
+def _contacts(parts: list[Section]) -> Section:
+    return parts[list(GROUPS).index("contact")]
+
+
+def _memory_without_effects(state: Any, row: Array, contacts: Section) -> Array:
+    """Effects' memory of contacts saved without effects: zero except for the contact radii, which are Hertz's."""
+    before = GROUPS["contact"].index("radius")
+    memory = np.zeros((contacts.entries, state.memory.number.shape[2]))
+    memory[:, HERTZ] = contacts.table(row)[:, _width(contacts.fields[:before])]
+    return memory.ravel()
 
 
 def _world_column(state: Any, name: str) -> int:
-    before = tuple(WORLD)[: tuple(WORLD).index(name)]
-    return _width(tuple(getattr(state.world, name) for name in before))
+    return _width(world_fields(state)[: tuple(WORLD).index(name)])
 
 
 def _width(fields: tuple[Any, ...]) -> int:
     """Number of columns that one entry of ``fields`` takes."""
-    return sum(getattr(field, "n", 1) * getattr(field, "m", 1) for field in fields)
+    return sum(map(columns_of, fields))

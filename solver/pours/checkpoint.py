@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from solver.engine.moving_state import Moving
-from solver.engine.snapshot import TABLES, Arrays
+from solver.engine.snapshot import NAMES, Arrays
 from solver.engine.world import Batch
 from solver.npz import npz_arrays
 from solver.params import ParameterError
@@ -166,8 +166,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
 
 def fingerprint(scene: Scene) -> str:
     """Equal for pours of one key (mesh files by their contents) whose checkpoints hold the same arrays."""
-    held = [f"{group}.{name}" for group, table in TABLES.items() for name in table]
-    return hashlib.sha256(f"{pour_key(scene, seed=0)} {PLAIN} {held}".encode()).hexdigest()
+    return hashlib.sha256(f"{pour_key(scene, seed=0)} {PLAIN} {NAMES}".encode()).hexdigest()
 
 
 def keep(pour: Pour) -> Kept:

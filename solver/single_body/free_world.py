@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from solver.engine.state import Capacity
 from solver.engine.tables import body_tables, wall_tables
-from solver.engine.world import SUMMARY_COLUMNS, Batch, compiled_in
+from solver.engine.world import SUMMARY_COLUMNS, Batch, compiled_in, wall_materials
 from solver.rigs.rig import BareRig
 from solver.rigs.surface import Surface, horizontal
 from solver.scenes.body import Body, Members
@@ -38,8 +38,8 @@ RADIUS = 5e-3
 AT_REST = np.zeros(3)
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
-ROOM = Capacity(worlds=1, bodies=128, members=1024, contacts=8192, kinds=64).rounded()
-"""One size for all free worlds without a mesh, so that the kernels are compiled once. Only the newest one is valid."""
+ROOM = Capacity(worlds=1, bodies=128, members=1024, contacts=8192).rounded()
+"""One size for free worlds and small pours, so that the kernels are compiled once. Only the newest one is valid."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class FreeWorld:
         self.n = len(order)
         self.dt = dt or time_step(self.scene)
         surfaces = self.scene.rig.surfaces()
-        self.batch = Batch(dataclasses.replace(room_for(surfaces), **compiled_in([self.scene])))
+        self.batch = Batch(dataclasses.replace(room_for(self.scene), **compiled_in([self.scene])))
         self.batch.load(0, self.scene, body_tables(self.scene, order), self.dt, active or [plate] * len(surfaces))
 
     def put(
@@ -145,11 +145,12 @@ class FreeWorld:
         return self.batch.bodies(0, self.n)
 
 
-def room_for(surfaces: Sequence[Surface]) -> Capacity:
-    """:data:`ROOM`, with as much room for triangles as ``surfaces`` need."""
-    tables = wall_tables(tuple(surfaces))
+def room_for(scene: Scene) -> Capacity:
+    """:data:`ROOM`, with as much room for contact classes and triangles as ``scene`` needs."""
+    tables = wall_tables(tuple(scene.rig.surfaces()))
     return dataclasses.replace(
         ROOM,
+        kinds=len(scene.bodies) + len(wall_materials(scene)),
         walls=max(ROOM.walls, len(tables.poses)),
         surfaces=max(ROOM.surfaces, len(tables.surfaces)),
         triangles=max(1, len(tables.corners)),

@@ -89,8 +89,9 @@ def test_what_holds_a_sleeper_and_where_its_members_are(heap, pile):
     # One whose neighbours went on settling after it fell asleep may be off by more, until it wakes.
     assert (np.linalg.norm(held, axis=1) < BALANCE * 9.81 * masses).mean() > 0.9
     assert np.all(np.linalg.norm(held, axis=1) < WAKE * 9.81 * masses)
-    listed, owner = arrays["member.listed"] == 1, arrays["member.body"]
-    turned = np.einsum("mij,mj->mi", rotation_matrix(before[owner, 3:7]), arrays["member.local"])
+    layout = pour.supply.layout
+    listed, owner = arrays["member.listed"] == 1, layout.owner[:, 0]
+    turned = np.einsum("mij,mj->mi", rotation_matrix(before[owner, 3:7]), layout.spheres[:, :3])
     assert listed.sum() > len(before)
     assert arrays["member.centre"][listed] == pytest.approx((before[owner, :3] + turned)[listed], abs=1e-12)
 
