@@ -40,6 +40,8 @@ UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 ROOM = Capacity(worlds=1, bodies=128, members=1024, contacts=8192).rounded()
 """One size for free worlds and small pours, so that the kernels are compiled once. Only the newest one is valid."""
+MANY_KINDS = 64
+"""Contact classes of the next size."""
 
 
 @dataclass(frozen=True)
@@ -147,10 +149,10 @@ class FreeWorld:
 
 def room_for(scene: Scene) -> Capacity:
     """:data:`ROOM`, with as much room for contact classes and triangles as ``scene`` needs."""
-    tables = wall_tables(tuple(scene.rig.surfaces()))
+    tables, kinds = wall_tables(tuple(scene.rig.surfaces())), len(scene.bodies) + len(wall_materials(scene))
     return dataclasses.replace(
         ROOM,
-        kinds=len(scene.bodies) + len(wall_materials(scene)),
+        kinds=ROOM.kinds if kinds <= ROOM.kinds else max(kinds, MANY_KINDS),
         walls=max(ROOM.walls, len(tables.poses)),
         surfaces=max(ROOM.surfaces, len(tables.surfaces)),
         triangles=max(1, len(tables.corners)),

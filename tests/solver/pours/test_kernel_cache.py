@@ -15,7 +15,7 @@ from solver import backend, capacity_for, load_material, warm_up, with_values
 from solver.engine.state import Capacity
 from solver.pours import kernel_cache
 from solver.pours.kernel_cache import compiled_once, missing
-from solver.single_body.free_world import GRAIN, ROOM, WALL, grain_on_plate, room_for, scene_of, sphere
+from solver.single_body.free_world import GRAIN, MANY_KINDS, ROOM, WALL, grain_on_plate, room_for, scene_of, sphere
 
 ONE = Capacity(worlds=1, bodies=128, members=1024, contacts=16384)
 OTHER = Capacity(worlds=1, bodies=256, members=1024, contacts=16384)
@@ -188,7 +188,7 @@ def test_a_single_body_needs_no_kernels_but_those_of_a_small_pour():
     pour = with_values(load_material("sunflower_extract"), {"body.spheres": "coarse", "rig.mass": "1g"})
     assert room_for(grain_on_plate()) == ROOM == capacity_for([pour], 1) == ONE
     many = scene_of([sphere(name=f"b{k}") for k in range(ROOM.kinds)], (GRAIN, WALL), grain_on_plate().pairs)
-    assert room_for(many) == replace(ROOM, kinds=2 * ROOM.kinds)
+    assert room_for(many) == replace(ROOM, kinds=MANY_KINDS).rounded()
 
 
 def test_warm_rooms_are_found(folder):
