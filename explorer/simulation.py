@@ -15,6 +15,7 @@ from explorer.background.progress import PourProgress, SimulatedTime
 from explorer.background.reporter import Reporter
 from explorer.errors import CommandError
 from explorer.files.checkpoint_writer import CheckpointWriter
+from explorer.files.output_file import check_folder_of
 from explorer.files.run_folder import appearing, write_result, write_run
 from explorer.files.run_result import BenchTestResult, SimulationResult, bench_test_result, simulation_result
 from explorer.scene.file import load_scene, with_settings
@@ -86,8 +87,8 @@ def simulation_of(order: SimulateOrder, events: bool = False) -> Simulation:
     if order.replicates > 1 and (order.checkpoint or order.resume):
         raise CommandError("--checkpoint and --resume: allowed for one pour only; leave out --replicates")
     interrupted = read_checkpoint(order.resume) if order.resume else None
-    if order.checkpoint and not order.checkpoint.absolute().parent.is_dir():
-        raise CommandError(f"--checkpoint: {order.checkpoint}: no folder {order.checkpoint.absolute().parent}")
+    if order.checkpoint:
+        check_folder_of(order.checkpoint, "--checkpoint")
     scene = with_settings(load_scene(order.source, order.material), order.settings)
     first = interrupted.seed if interrupted else 1 if order.seed is None else order.seed
     if order.seed not in (None, first):

@@ -62,7 +62,7 @@ def bench(
 
     from explorer.benchmark import BEDS, CASES, PEERS, USUAL_BEDS, Options
     from explorer.errors import CommandError
-    from explorer.files.output_file import write_whole
+    from explorer.files.output_file import check_folder_of, write_whole
     from explorer.files.run_folder import json_text
     from explorer.terminal.benchmark import fallen, machine, markdown, result_of, table_text
 
@@ -77,8 +77,8 @@ def bench(
     if duration != USUAL_DURATION and only and "pour" not in only:
         raise CommandError("--duration: applies to the case pour, which --only leaves out")
     for option, path in (("--json", json), ("--table", table)):
-        if path and not path.absolute().parent.is_dir():
-            raise CommandError(f"{option}: {path}: no folder {path.absolute().parent}")
+        if path:
+            check_folder_of(path, option)
     committed = _earlier(against) if against else None
     installed = tuple(name for name in PEERS if peers and shutil.which(name))
     if peers and len(installed) < len(PEERS):

@@ -63,9 +63,10 @@ def verify(
     is met and 1 if not; rows without a limit are shown for comparison. The results of --peers do not change it.
     """
     from explorer.errors import CommandError
+    from explorer.files.output_file import check_folder_of, write_whole
 
-    if json and not json.absolute().parent.is_dir():
-        raise CommandError(f"--json: {json}: no folder {json.absolute().parent}")
+    if json:
+        check_folder_of(json, "--json")
     if peer_limit is not None and not peers:
         raise CommandError("--peer-limit: allowed only with --peers")
     if economy is not None:
@@ -80,7 +81,6 @@ def verify(
         raise CommandError("--change, --profile, --pours, --store: allowed only with --economy")
     from explorer.export.impacts import liggghts_engine
     from explorer.export.run import installed
-    from explorer.files.output_file import write_whole
     from explorer.files.run_folder import json_text
     from explorer.terminal.verification import peers_text, result_of, summary_text, table_text
     from solver.verification import BY_ANY_ENGINE, FAMILIES, OURS_BY_DISPLACEMENT, verify_engine

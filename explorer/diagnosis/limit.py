@@ -22,7 +22,7 @@ from doe.validation.laboratory import read_laboratory
 from doe.validation.limit import RISK, RISKS, LimitStudy, Strength, confused, limit_study
 from doe.validation.reference import ROOT, Reference, extended_to, kept
 from explorer.background.progress import time_left
-from explorer.files.output_file import write_whole
+from explorer.files.output_file import check_folder_of, write_whole
 from explorer.files.run_folder import json_text
 from explorer.terminal.text_table import text_table
 from solver import EFFECTS, PHYSICS, executor
@@ -54,6 +54,8 @@ class LimitOrder:
 
 def run_limit(order: LimitOrder, say: Callable[[str], None]) -> tuple[LimitStudy, tuple[CrossValidation, ...]]:
     """Pour the missing rounds, and write what follows from them all. Every pour and every round is kept."""
+    check_folder_of(order.out, "--out")
+    check_folder_of(order.reference, "--reference")
     measurement = _declared(order.source)
     declared = declare(measurement, tuple(EFFECTS))
     sets = [feature_set(condition) for condition in measurement.fit]

@@ -22,6 +22,7 @@ import numpy as np
 
 from explorer.files.output_file import check_vacant
 from explorer.files.run_result import BenchTestResult, ParameterValue, SimulationResult
+from explorer.scene.text import toml_key, toml_value
 from solver import Record
 
 TRACE_COLUMNS = {
@@ -117,5 +118,5 @@ def parameters_text(values: dict[str, ParameterValue]) -> str:
     lines = ["# Every parameter of the run; SI."]
     for path, entry in values.items():
         unit = "" if entry.unit == "1" else f"   # [{entry.unit}]"
-        lines.append(f"{json.dumps(path)} = {json.dumps(entry.value)}{unit}")
+        lines.append(f"{toml_key(path)} = {toml_value(entry.value)}{unit}")
     return "\n".join(lines) + "\n"

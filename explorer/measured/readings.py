@@ -331,6 +331,11 @@ def _scans(brought: Brought, found: Readings) -> None:
     for k, (file, scan) in enumerate(zip(brought.scans, scans, strict=True), start=1):
         surface = without_holes(scan.height_map(PROFILE_RING * rings, scan.grid))
         middle, height = radial_profile(surface, PROFILE_RING, rings)
+        if np.isnan(height).any():
+            raise CommandError(
+                f"--scan {file}: its points lie {1e3 * scan.grid:.3g} mm apart, too far for a profile in rings of "
+                f"{1e3 * PROFILE_RING:g} mm; allowed: as far as a ring is wide, or less"
+            )
         found.rows.extend(
             Row(k, "height_profile_m", float(z), float(r)) for r, z in zip(middle.round(6), height, strict=True)
         )

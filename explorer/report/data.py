@@ -105,13 +105,12 @@ def _study_runs(result: StudyResult) -> DataTable:
 
 def _parameters(result: StudyResult) -> DataTable:
     """Every parameter at its reference value, and those of the surface within what the target allows (SI)."""
-    units, guesses, single = parameter_units(), is_assumed(result.study.assumed), result.optimum.single
+    units, guesses, estimates = parameter_units(), is_assumed(result.study.assumed), result.optimum.estimates
     source = Path(result.study.file).name
-    place = {factor.path: k for k, factor in enumerate(result.optimum.factors)}
     values = dict(result.set_up.values) if result.set_up else {f.path: f.reference for f in result.study.factors}
     rows = []
     for path, reference in values.items():
-        head, k = path.partition(".")[0], place.get(path)
+        head, found = path.partition(".")[0], estimates.get(path)
         origin = "assumed" if path in guesses else "setting" if head in SETTING else "stated"
         row: tuple[str | float | int | None, ...] = (
             path,
@@ -120,12 +119,10 @@ def _parameters(result: StudyResult) -> DataTable:
             origin,
             source,
         )
-        if k is None:
+        if found is None:
             rows.append((*row, None, None, None, None))
-            continue
-        known = single.identifies(k)
-        ends = (single.point_low, single.point_high) if known else (single.solution_low, single.solution_high)
-        rows.append((*row, result.optimum.values[path], *(float(end[k]) for end in ends), "yes" if known else "no"))
+        else:
+            rows.append((*row, found.value, found.low, found.high, "yes" if found.identified else "no"))
     header = ("path", "value", "unit", "origin", "source", "at_optimum", "low", "high", "identified")
     return DataTable("parameters", header, tuple(rows))
 

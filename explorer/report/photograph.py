@@ -7,7 +7,7 @@ import io
 from PIL import Image
 
 from explorer.photograph.annotated import sheet
-from explorer.photograph.result import MeasuredPhotographs, PhotographResult
+from explorer.photograph.result import MeasuredPhotographs, PhotographResult, ReadPile
 from explorer.photograph.run import MeasureOrder
 from explorer.report.content import (
     Banner,
@@ -154,9 +154,9 @@ def banner(result: PhotographResult) -> Banner:
 
 
 def outlines(result: PhotographResult) -> Spec:
-    """The outlines superimposed on one scale."""
-    in_metres = all(pile.unit == "m" for pile in result.piles)
-    factor, unit = (1e3, "mm") if in_metres else (1.0, "px")
+    """The outlines superimposed on one scale: those whose scale is known, in pixels only if none is."""
+    piles = _on_one_scale(result)
+    factor, unit = (1e3, "mm") if piles[0].unit == "m" else (1.0, "px")
     traces = [
         {
             "type": "scatter",
@@ -166,7 +166,7 @@ def outlines(result: PhotographResult) -> Spec:
             "name": label(pile.name),
             "line": line(COLOURS[k % len(COLOURS)]),
         }
-        for k, pile in enumerate(result.piles)
+        for k, pile in enumerate(piles)
     ]
     layout = {
         "xaxis": axis(f"distance from the pile’s middle [{unit}]"),
@@ -176,9 +176,14 @@ def outlines(result: PhotographResult) -> Spec:
 
 
 def _outline_words(result: PhotographResult) -> str:
-    n = len(result.piles)
-    piles = "pile" if n == 1 else "piles"
-    return f"n = {n} {piles}, the upper edge of each silhouette over its base line, both axes on one scale."
+    n = len(_on_one_scale(result))
+    piles, left = "pile" if n == 1 else "piles", len(result.piles) - n
+    without = f" {left} without a scale {'is' if left == 1 else 'are'} not drawn." if left else ""
+    return f"n = {n} {piles}, the upper edge of each silhouette over its base line, both axes on one scale.{without}"
+
+
+def _on_one_scale(result: PhotographResult) -> list[ReadPile]:
+    return [pile for pile in result.piles if pile.unit == "m"] or list(result.piles)
 
 
 def _angles(result: PhotographResult) -> Table:

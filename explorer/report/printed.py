@@ -107,22 +107,22 @@ def drawn(spec: Spec, width: float) -> Figure:
 
 
 def figure_data(name: str, spec: Spec) -> DataTable:
-    """What a chart shows, one line per point: trace, panel, x, y, z and the ends of its error bars."""
-    header = ("trace", "panel", "x", "y", "z", "x_minus", "x_plus", "y_minus", "y_plus")
+    """What a chart shows, one line per point: trace, panel, x, y, z, ends of its error bars, and its value in space."""
+    header = ("trace", "panel", "x", "y", "z", "x_minus", "x_plus", "y_minus", "y_plus", "value")
     return DataTable(name, header, tuple(row for trace in spec["data"] for row in _points_of(trace)))
 
 
 def _points_of(trace: Json) -> Iterator[tuple[Any, ...]]:
     head = (plain(str(trace.get("name", trace["type"]))), trace.get("xaxis", "x").removeprefix("x") or "1")
-    x, y, z = trace["x"], trace["y"], trace.get("value", trace.get("z"))
+    x, y, z = trace["x"], trace["y"], trace.get("z")
     if z is not None and trace["type"] in ("contour", "heatmap", "surface"):
         for b, row in zip(y, z, strict=True):
             for a, value in zip(x, row, strict=True):
-                yield (*head, a, b, value, None, None, None, None)
+                yield (*head, a, b, value, None, None, None, None, None)
         return
-    columns = [x, y, z if z is not None else [None] * len(x)]
+    nothing = [None] * len(x)
     bars = [side for key in ("error_x", "error_y") for side in _bars(trace.get(key), len(x))]
-    for row in zip(*columns, *bars, strict=True):
+    for row in zip(x, y, nothing if z is None else z, *bars, trace.get("value", nothing), strict=True):
         yield (*head, *(plain(cell) if isinstance(cell, str) else cell for cell in row))
 
 
@@ -408,8 +408,8 @@ def _bar(axes: Axes, trace: Json, spec: Spec, sides: tuple[Json, Json], order: f
         np.nan_to_num(np.array([math.nan if v is None else v for v in one["x"]], dtype=float))
         for one in (trace, *(group[: group.index(trace)] if stacked_up else ()))
     )
-    colour = trace["marker"]["color"]
-    axes.barh(place + shift, sizes, height=thick, left=sum(below, np.zeros(len(place))), color=colour, zorder=order)
+    look = {"color": trace["marker"]["color"], "alpha": trace["marker"].get("opacity", 1.0), "zorder": order}
+    axes.barh(place + shift, sizes, height=thick, left=sum(below, np.zeros(len(place))), **look)
 
 
 def _contour(axes: Axes, trace: Json, spec: Spec, order: float) -> None:

@@ -77,14 +77,14 @@ def radial_profile(surface: HeightMap, ring_width: float, rings: int) -> tuple[A
     """Azimuthal mean of a height map: middle radii of rings [m], mean heights in them [m]; shape (rings,)
     each.
 
-    The map must reach out to ``ring_width`` · ``rings``.
+    The map must reach out to ``ring_width`` · ``rings``. A ring in which no pixel has its centre is NaN.
     """
     ring = (surface.radius / ring_width).astype(np.int64).ravel()
     inside = ring < rings
     area = np.bincount(ring[inside], minlength=rings)
     total = np.bincount(ring[inside], weights=surface.height.ravel()[inside], minlength=rings)
     middle: Array = (np.arange(rings, dtype=np.float64) + 0.5) * ring_width
-    return middle, total / np.maximum(area, 1)
+    return middle, np.where(area > 0, total / np.maximum(area, 1), np.nan)
 
 
 def centre_of_mass(pile: Pile) -> Array:

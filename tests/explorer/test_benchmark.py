@@ -252,6 +252,7 @@ def test_a_run_to_its_end_is_complete(monkeypatch, tmp_path):
         (["--only", "race"], "'race' is not one of short, pour, bed, batch"),
         (["--spheres", "5"], "5 is not one of 1000, 10000, 100000, 1000000"),
         (["--json", "/no/such/folder/x.json"], "no folder /no/such/folder"),
+        (["--table", "/tmp"], "is a folder; name a file"),
         (["--table", "/no/such/folder/x.md"], "no folder /no/such/folder"),
         (["--against", "/no/such/x.json"], "not what --json of this command writes"),
     ],

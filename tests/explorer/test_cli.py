@@ -66,6 +66,7 @@ AT = "tcp://127.0.0.1:9"
         (["funnel", "--replicates", "0"], ["--replicates", "1"]),
         (["funnel", "--record", "pour.txt"], ["pour.txt", ".rrd"]),
         (["funnel", "--record", "no/such/folder/pour.rrd"], ["pour.rrd", "no folder"]),
+        (["funnel", "--checkpoint", "."], ["--checkpoint", "is a folder; name a file"]),
         ([], ["RIG_OR_FILE"]),
         (["funnel", "--frobnicate"], ["--frobnicate"]),
         (["funnel", "--scheduler", AT, "--record", "pour.rrd"], ["--record", "leave out --scheduler"]),

@@ -131,7 +131,7 @@ def pile(result: DiagnosisResult) -> Section | None:
         return None
     text = (
         "Mean height over the distance from the pile's own middle, mirrored; a band is one standard deviation between "
-        "pours. Heights and radii have one scale."
+        "pours. Heights are drawn larger than distances."
     )
     if not result.added:
         text += " Before and after are the same model here."

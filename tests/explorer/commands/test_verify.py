@@ -74,6 +74,7 @@ def test_a_missed_limit_is_exit_code_one():
     [
         (["--only", "T9"], ["--only", "T9", "T1, T2", "slope"]),
         (["--json", "no/such/folder/x.json"], ["--json", "no folder"]),
+        (["--json", "."], ["--json", "is a folder; name a file"]),
         (["--peer-limit", "5"], ["--peer-limit: allowed only with --peers"]),
     ],
 )

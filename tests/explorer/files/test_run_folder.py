@@ -1,13 +1,15 @@
 """The folder of a result is there at once and complete, wherever a person wants it."""
 
 import os
+import tomllib
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from explorer.errors import CommandError
-from explorer.files.run_folder import appearing
+from explorer.files.run_folder import appearing, parameters_text
+from explorer.files.run_result import ParameterValue
 
 
 def made(folder):
@@ -64,3 +66,10 @@ def test_what_fails_leaves_nothing_and_what_came_meanwhile_is_kept(tmp_path):
             stack.close()
     assert [one.name for one in (tmp_path / "out").iterdir()] == ["theirs"]
     assert [one.name for one in tmp_path.iterdir()] == ["out"]
+
+
+def test_parameters_are_toml_whatever_a_file_is_called():
+    """JSON writes a character beyond U+FFFF as two halves, which TOML refuses."""
+    name, path = "/tmp/\U0001f600 \x7f.stl", "rig.mesh"
+    text = parameters_text({path: ParameterValue(name, "1"), "rig.mass": ParameterValue(0.1, "kg")})
+    assert tomllib.loads(text) == {path: name, "rig.mass": 0.1}

@@ -242,6 +242,19 @@ def test_a_scanned_cone_has_the_rings_of_a_cone(material, tmp_path):
     assert "whole pile: surface of 1 of 1 piles in cells of 1 mm" in text
 
 
+def test_a_scan_too_coarse_for_rings_is_refused(material, tmp_path):
+    """At 8 mm no point lies in the innermost ring, whose height would be 0 under the top."""
+    axis = (np.arange(-12, 12) + 0.5) * 8e-3
+    x, y = np.meshgrid(axis, axis)
+    np.savetxt(
+        tmp_path / "cone.xyz", np.column_stack([x.ravel(), y.ravel(), np.maximum(0, 0.03 - np.hypot(x, y) / 2).ravel()])
+    )
+    given = ["--scan", tmp_path / "cone.xyz", "--scan-unit", "m", "--uncertainty", "height_profile_m=0.5mm"]
+    line = refused(explorer("new", "measurement", tmp_path / "data", "--material", material, *given))
+    assert "its points lie 8 mm apart, too far for a profile in rings of 5 mm" in line
+    assert not (tmp_path / "data").exists()
+
+
 def test_a_drum_s_sheet_is_read_as_the_laboratory_does(tmp_path):
     folder = tmp_path / "data"
     rig = ["rig.name=rotating_drum", "rig.speed_rpm=2", "rig.diameter=200mm"]

@@ -1,6 +1,7 @@
 """Reports of bench tests, photographs, sheets of runs, their analysis and audits: one form, by one option."""
 
 import csv
+import dataclasses
 import hashlib
 import io
 import json
@@ -25,7 +26,7 @@ from explorer.report.bench import bench_record, bench_report
 from explorer.report.content import Figure, Picture, Table, Word
 from explorer.report.folder import MANIFEST
 from explorer.report.html import page
-from explorer.report.photograph import png_within
+from explorer.report.photograph import outlines, photograph_report, png_within
 from explorer.report.printed import drawn
 from explorer.report.project import KINDS, finished_folders, part_of, project_report
 from explorer.report.sources import SOURCES, cited
@@ -313,6 +314,20 @@ def test_the_angle_of_a_picture_has_the_interval_of_reading_it(places):
     assert abs(value - 27.5) <= half  # a solid of 25° and 30°
     (pile,) = part.result.piles
     assert 2.0 * math.sqrt(sum(one**2 for one in pile.parts.values())) == pytest.approx(pile.mean[1], rel=1e-6)
+
+
+def test_outlines_without_a_scale_are_not_drawn_beside_those_in_millimetres(places):
+    """An outline of 0.1 m would be a tenth of a pixel."""
+    result = part_of(places["Photographs"]).result
+    (pile,) = result.piles
+    bare = dataclasses.replace(pile, name="bare", unit="px", u=tuple(1e4 * u for u in pile.u))
+    spec = outlines(dataclasses.replace(result, piles=(pile, bare)))
+    (trace,) = spec["data"]
+    assert trace["x"] == [1e3 * u for u in pile.u]
+    assert spec["layout"]["xaxis"]["title"]["text"].endswith("[mm]")
+    report = photograph_report(dataclasses.replace(result, piles=(pile, bare)), None)
+    assert "1 without a scale is not drawn" in str(next(one for one in report.sections if one.title == "Outlines"))
+    assert outlines(dataclasses.replace(result, piles=(bare,)))["layout"]["xaxis"]["title"]["text"].endswith("[px]")
 
 
 def test_the_thirds_on_a_picture_have_the_slope_of_the_solid():

@@ -19,8 +19,10 @@ from explorer.design.analysis import AnalyseOrder, run_analyse
 from explorer.errors import CommandError
 from explorer.report import folder, study_report
 from explorer.report.content import Caution, DataTable, Drawing, Figure, Strong, Struck, Table, Word
+from explorer.report.data import study_data
 from explorer.report.design import design_report
 from explorer.report.diagnosis import diagnosis_report
+from explorer.report.figures.style import axis, chart
 from explorer.report.folder import MANIFEST, NO_FIGURES, bibtex, write_report
 from explorer.report.html import page
 from explorer.report.printed import INCH, WIDTHS, drawn, figure_data, printed
@@ -117,6 +119,18 @@ def test_parameters_say_their_unit_and_where_they_come_from(study, place):
         assert float(row["low"]) == single.solution_low[k]  # the range that gives the target, not the set of the pick
 
 
+def test_parameters_of_several_targets_are_those_of_all_of_them():
+    result = reported_studies.typed(reported_studies.result_of_case("two targets"))
+    table = next(one for one in study_data(result) if one.name == "parameters")
+    rows = {row[0]: row[-4:] for row in table.rows}
+    assert result.optimum.compromise is not None
+    for path, one in result.optimum.estimates.items():
+        assert rows[path] == (one.value, one.low, one.high, "yes" if one.identified else "no")
+    single = result.optimum.single
+    firsts = [(single.solution_low[k], single.solution_high[k]) for k in range(len(result.optimum.factors))]
+    assert [rows[factor.path][1:3] for factor in result.optimum.factors] != firsts
+
+
 def test_the_anova_file_adds_up(place):
     rows = {row["source"]: row for row in rows_of(place / "data/anova.csv")}
     parts = sum(float(rows[name]["sum_of_squares"]) for name in ("model", "residual"))
@@ -157,6 +171,23 @@ def test_print_has_the_points_of_the_page(specs):
     assert [row[2:4] for row in written.rows if row[0] == "fresh pours"] == list(
         zip(pours["x"], pours["y"], strict=True)
     )
+
+
+def test_bars_that_are_pale_on_the_page_are_pale_in_print():
+    pale = {"type": "bar", "name": "beside", "orientation": "h", "x": [40.0], "y": ["JKR"]}
+    marks = [{"color": "#305070", "opacity": opacity} for opacity in (1.0, 0.3)]
+    spec = chart(
+        [pale | {"marker": mark} for mark in marks], {"barmode": "stack", "xaxis": axis("probability [%]")}, 200
+    )
+    bars = drawn(spec, 85).axes[0].patches
+    assert [bar.get_alpha() for bar in bars] == [1.0, 0.3]
+
+
+def test_the_data_of_a_surface_in_space_have_all_three_coordinates(specs):
+    spec = specs["1-solutions"]
+    space = next(trace for trace in spec["data"] if trace["type"] == "isosurface")
+    written = np.array([[row[k] for k in (2, 3, 4, 9)] for row in figure_data("x", spec).rows[: len(space["x"])]])
+    np.testing.assert_array_equal(written, np.column_stack([space[key] for key in ("x", "y", "z", "value")]))
 
 
 def test_a_surface_in_space_is_printed_as_contours_with_the_level_of_the_target(specs):
