@@ -4,8 +4,6 @@ A snapshot is not tied to a slot: it can be put into any slot of a batch with ro
 loaded there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
