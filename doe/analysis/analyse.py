@@ -15,7 +15,15 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.analysis.canonical import Canonical, RidgePath, canonical_analysis, ridge_analysis
-from doe.analysis.contrasts import Contrasts, Curvature, curvature, is_regular, regular_contrasts, screening_contrasts
+from doe.analysis.contrasts import (
+    Contrasts,
+    Curvature,
+    curvature,
+    is_regular,
+    regular_contrasts,
+    screening_contrasts,
+    separable_contrasts,
+)
 from doe.analysis.elementary_effects import ElementaryEffects
 from doe.analysis.few_terms import FewTermsModel, few_terms
 from doe.analysis.gaussian_process import GaussianProcess, ProcessTarget
@@ -243,10 +251,13 @@ def _effects(coded: FloatArray, responses: FloatArray, names: Sequence[str], not
         return None
     regular = is_regular(levels)
     contrasts = regular_contrasts(levels, names) if regular else screening_contrasts(levels, names)
-    if np.isnan(values).all(axis=1).any() or len(contrasts.names) < len(names):
-        # A lost row destroys orthogonality: only the effects fitted by least squares can still be separated.
-        contrasts = Contrasts(levels, tuple(names), (), {})
-        notes.append("Rows without a valid run: interactions and unused columns are left out of the effects.")
+    valid = ~np.isnan(values).all(axis=1)
+    if not valid.all():
+        whole, contrasts = contrasts, separable_contrasts(contrasts, levels, names, valid)
+        if lost := [name for name in whole.names if name not in contrasts.names]:
+            notes.append(
+                f"Rows without a valid run: the effects leave out {', '.join(lost)}, which cannot be separated."
+            )
     screening = analyse_screening(contrasts.levels, contrasts.names, values, contrasts.dummies)
     searched = () if regular else few_terms(levels, names, row_moments(values)[0])
-    return Effects(contrasts, screening, curvature(coded, responses), searched)
+    return Effects(contrasts, screening, curvature(contrasts.levels, values, responses[centre]), searched)

@@ -23,6 +23,7 @@ from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
 MOST_FACTORS = 10
 """Largest number of factors of a regular design for which all products are formed."""
 
@@ -43,9 +44,10 @@ class Contrasts(Record):
 
 @dataclass(frozen=True)
 class Curvature(Record):
-    """Centre runs against the corners. difference = mean(corners) - mean(centre), unit of the response.
+    """Centre runs against the corners. difference = d, what the corners' model has at the centre less the mean there.
 
-    SS = nF nC difference^2/(nF + nC), 1 degree of freedom, tested against the spread of centre runs and of replicates.
+    With c_r the weight of row r in that model's intercept, SS = d^2/(sum c_r^2/n_r + 1/nC), 1 degree of freedom, tested
+    against the spread of centre runs and of replicates; nF nC d^2/(nF + nC) where all corners are run equally often.
     """
 
     difference: float
@@ -110,23 +112,44 @@ def screening_contrasts(levels: IntArray, names: Sequence[str]) -> Contrasts:
     return Contrasts(np.hstack([levels, unused]), (*names, *dummies), dummies, main_effect_aliases(levels, names))
 
 
-def curvature(levels: FloatArray, responses: FloatArray) -> Curvature | None:
-    """Return the test of the centre runs (all levels 0) against the corners; None without both or without an error.
-
-    levels: (rows, factors) of -1, 0, +1; responses: (rows, replicates), NaN where missing.
+def separable_contrasts(whole: Contrasts, levels: IntArray, names: Sequence[str], valid: Mask) -> Contrasts:
+    """Return the columns that the ``valid`` rows of a design separate by least squares: those of the factors, then
+    those of two-factor interactions as long as the rank grows. Larger interactions and unused columns are left out.
     """
-    centre = ~levels.any(axis=1)
-    corners, middles = (values[~np.isnan(values)] for values in (responses[~centre], responses[centre]))
-    if corners.size == 0 or middles.size == 0:
+    kept, titles = [*levels.T], list(names)
+    for title, column in zip(whole.names, whole.levels.T, strict=True):
+        if title in names or title in whole.dummies:
+            continue
+        model = np.column_stack([np.ones(len(levels)), *kept, column])[valid]
+        if np.linalg.matrix_rank(model) == model.shape[1]:
+            kept.append(column)
+            titles.append(title)
+    if len(titles) > len(names):
+        aliases = {title: whole.aliases[title] for title in titles}
+    else:
+        aliases = main_effect_aliases(levels[valid], names)
+    return Contrasts(np.column_stack(kept), tuple(titles), (), aliases)
+
+
+def curvature(levels: IntArray, corners: FloatArray, centre: FloatArray) -> Curvature | None:
+    """Return the test of the centre runs against the corners; None without both or without an error.
+
+    levels: columns of the model of the corners, (rows, columns) of -1/+1; corners, centre: responses, (rows,
+    replicates), NaN where missing.
+    """
+    middles = centre[~np.isnan(centre)]
+    means, counts, within = row_moments(corners)
+    valid = counts > 0
+    if not valid.any() or middles.size == 0:
         return None
-    _, _, within = row_moments(responses[~centre])
-    counts = (~np.isnan(responses[~centre])).sum(axis=1)
-    df = int(np.maximum(counts - 1, 0).sum()) + middles.size - 1
+    df = int((counts[valid] - 1).sum()) + middles.size - 1
     error = float(within.sum() + ((middles - middles.mean()) ** 2).sum())
     if df < 1 or error == 0:
         return None
-    difference = float(corners.mean() - middles.mean())
-    squares = corners.size * middles.size * difference**2 / (corners.size + middles.size)
+    # Weights of the row means in the intercept.
+    weights = np.linalg.pinv(np.column_stack([np.ones(int(valid.sum())), levels[valid]]))[0]
+    difference = float(weights @ means[valid] - middles.mean())
+    squares = difference**2 / float((weights**2 / counts[valid]).sum() + 1 / middles.size)
     f = squares / (error / df)
     return Curvature(difference, squares, error / df, df, f, float(stats.f.sf(f, 1, df)))
 

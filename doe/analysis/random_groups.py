@@ -143,7 +143,7 @@ class _Likelihood:
         return self.deviance(within, ratio * within)
 
     def score(self, ratio: float) -> float:
-        """Half of the derivative of the profile: tr(Z'PZ) - df |Z'Py|^2/(y'Py), in units of s^2 = 1."""
+        """Derivative of the profile: tr(Z'PZ) - df |Z'Py|^2/(y'Py), in units of s^2 = 1."""
         _, coefficients, squares = self.solved(ratio)
         sums = (self.value_sums - self.model_sums @ coefficients) / (1 + ratio * self.sizes)
         return float(np.trace(self.projected(ratio)) - self.df * float(sums @ sums) / squares)

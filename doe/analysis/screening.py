@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
@@ -106,8 +107,8 @@ class Lenth(Record):
 
 @dataclass(frozen=True)
 class Screening(Record):
-    """Effects of a two-level design. `missing_rows` are row indices without a valid run; `notes` are
-    sentences.
+    """Effects of a two-level design. `mean` is the response at the centre (the intercept); `missing_rows` are row
+    indices without a valid run; `notes` are sentences.
     """
 
     effects: tuple[FactorEffect, ...]
@@ -223,7 +224,8 @@ def analyse_screening(
     sums = effects**2 / norms
     total = float(means @ means)
 
-    dummy_error, dummy_scale = error_of_dummies(levels[:, ~is_dummy], means, norms[~is_dummy], alpha)
+    dummies_left = levels[:, is_dummy] if complete else levels[:, :0]
+    dummy_error, dummy_scale = error_of_dummies(levels[:, ~is_dummy], dummies_left, means, norms[~is_dummy], alpha)
     spread = np.full(len(names), np.nan)
     spread[used] = np.sqrt((estimator**2 / counts).sum(axis=1))
     df_pure = int((counts - 1).sum())
@@ -248,7 +250,7 @@ def analyse_screening(
             )
             for j, name in enumerate(names)
         ),
-        mean=mean,
+        mean=mean + float(means[0] + found.params[0]),  # the fit is of the differences from the first row
         rows=int(design.shape[0]),
         missing_rows=tuple(int(row) for row in np.flatnonzero(~valid)),
         runs=int(counts.sum()),
@@ -258,7 +260,7 @@ def analyse_screening(
         lenth=lenth(effects[used], alpha),
         unexplained_f=unexplained_f,
         unexplained_p=unexplained_p,
-        notes=_notes(valid, dummy_error, pure_error, pure_sigma, total, unexplained_p),
+        notes=_notes(valid, dummy_error, pure_error, pure_sigma, total, unexplained_p, _leaks(levels, names, is_dummy)),
     )
 
 
@@ -303,14 +305,21 @@ def select_factors(
 
 
 def error_of_dummies(
-    levels: FloatArray, means: FloatArray, norms: FloatArray, alpha: float
+    levels: FloatArray, dummies: FloatArray, means: FloatArray, norms: FloatArray, alpha: float
 ) -> tuple[ErrorEstimate | None, float]:
-    """Return the error left by the factors on row means and its standard deviation (NaN without df)."""
+    """Return the error of row means and its standard deviation (NaN without df): what the columns `dummies` explain
+    beyond the factors. Without such columns it is all that the factors leave.
+    """
     model = with_intercept(levels)
     df = model.shape[0] - model.shape[1]
     if df < 1:
         return None, math.nan
-    sigma = math.sqrt(float(least_squares(model, means).mse_resid))
+    squares = float(least_squares(model, means).ssr)
+    if 0 < dummies.shape[1] < df:
+        # In a fold-over, the rest of what the factors leave holds the interactions, from which the factors are clear.
+        squares -= float(least_squares(np.hstack([model, dummies]), means).ssr)
+        df = dummies.shape[1]
+    sigma = math.sqrt(max(squares, 0.0) / df)
     return error_estimate("dummies", sigma, df, sigma * np.sqrt(norms), alpha), sigma
 
 
@@ -416,6 +425,7 @@ def _notes(
     pure_sigma: float,
     total: float,
     unexplained_p: float,
+    leaks: bool,
 ) -> tuple[str, ...]:
     """Return what a reader of the effects must know, as sentences."""
     notes = []
@@ -435,10 +445,20 @@ def _notes(
         notes.append("The response is the same in every row; no effect can be tested.")
     if unexplained_p < 0.05:
         notes.append(
-            f"The dummy columns hold more than replicate noise (p = {unexplained_p:.3g}): interactions leak "
-            "into the main effects."
+            f"The dummy columns hold more than replicate noise (p = {unexplained_p:.3g}): interactions "
+            f"{'leak into the main effects' if leaks else 'act; the main effects are clear of those of two factors'}."
         )
     return tuple(notes)
+
+
+def _leaks(levels: FloatArray, names: Sequence[str], is_dummy: npt.NDArray[np.bool_]) -> bool:
+    """Whether an interaction of two factors changes the estimate of a main effect; levels: the valid rows."""
+    factors = levels[:, [not dummy and "*" not in name for name, dummy in zip(names, is_dummy, strict=True)]]
+    products = [factors[:, i] * factors[:, j] for i, j in combinations(range(factors.shape[1]), 2)]
+    if not products:
+        return False
+    carried = np.linalg.pinv(with_intercept(factors))[1:] @ np.column_stack(products)
+    return bool(np.abs(carried).max() > 1e-9)
 
 
 def _require_consistent(design: npt.NDArray[np.number[Any]], names: Sequence[str], dummies: Sequence[str]) -> None:

@@ -183,7 +183,9 @@ def coded_constraint(text: str, factors: tuple[DesignFactor, ...]) -> tuple[floa
         raise CommandError(f"--constraint {text!r}: {allowed}")
     known = factor_words(factors)
     name = "|".join(re.escape(one) for one in sorted(known, key=len, reverse=True))
-    number = r"\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+"
+    # "2E+3" is 2000, but twice a factor E, and 3 more, where there is one.
+    exponent = "" if {"e", "E"} & set(known) else r"(?:[eE][+-]?\d+)?"
+    number = rf"\d+\.?\d*{exponent}|\.\d+"
     term = re.compile(rf"([+\-−]?)\s*(?:({number})\s*(?:\*?\s*({name})(?!\w))?|({name})(?!\w))\s*")
     weights, bound = np.zeros(len(factors)), 0.0
     for side, part in zip((1.0, -1.0), sides, strict=True):

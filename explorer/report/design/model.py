@@ -202,17 +202,17 @@ def _errors(part: DrawnEffects) -> list[tuple[str, str]]:
             f"for all effects at once {number(lenth.simultaneous_margin, 4)}",
         )
     ]
-    for error, title in (
-        (analysis.pure_error, "Error by replicates"),
-        (analysis.dummy_error, "Error by columns without a factor"),
+    for error, title, of in (
+        (analysis.pure_error, "Error by replicates", "σ of a run"),
+        (analysis.dummy_error, "Error by columns without a factor", "σ of a row's mean"),
     ):
         if error is not None:
             found.append(
                 (
                     title,
-                    f"σ = {observed(response, error.sigma)}, {counted(error.df, 'degree of freedom')}; margin of one "
-                    f"effect {observed(response, error.margin)}, of all {observed(response, error.margin_bonferroni)}; "
-                    f"seen with chance 0.8: {observed(response, error.smallest_detectable_effect)}",
+                    f"{of} = {observed(response, error.sigma)}, {counted(error.df, 'degree of freedom')}; margin of "
+                    f"one effect {observed(response, error.margin)}, of all "
+                    f"{observed(response, error.margin_bonferroni)}; seen with chance 0.8: {observed(response, error.smallest_detectable_effect)}",
                 )
             )
     return found

@@ -133,8 +133,57 @@ def test_replicates_decide_and_a_lost_row_leaves_the_factors():
     assert full.effects.screening.significant() == ("A",)
     values[3] = np.nan
     lost = analyse_design(design, values, region("ABC"))
-    assert set(effects_of(lost)) == {"A", "B", "C"}
-    assert any("without a valid run" in note for note in lost.notes)
+    assert set(effects_of(lost)) == {"A", "B", "C", "A*B", "A*C", "B*C"}
+    assert any("leave out A*B*C" in note for note in lost.notes)
+
+
+@pytest.mark.parametrize("row", range(8))
+def test_an_interaction_makes_no_main_effect_where_a_row_is_lost(row):
+    """By main effects alone, A, B and C would be ± 2.5 each, with t = 11."""
+    design = factorial(3).astype(float)
+    values = 20 + 5 * design[:, [0]] * design[:, [1]] + 0.5 * np.random.default_rng(5).standard_normal((8, 3))
+    values[row] = np.nan
+    found = analyse_design(design, values, region("ABC")).effects.screening
+    assert found.significant()[0] == "A*B"
+    assert not {"A", "B", "C"} & set(found.significant())
+    assert found.mean == pytest.approx(20.0, abs=0.5)
+
+
+def test_a_lost_corner_is_no_curvature():
+    """y = 10 + 5 A: the mean of seven corners is not the response between them."""
+    design = np.vstack([factorial(3), np.zeros((4, 3))]).astype(float)
+    values = 10 + 5 * design[:, 0]
+    values[8:] = [9.9, 10.1, 10.0, 10.0]
+    values[int(np.flatnonzero((design == 1).all(axis=1))[0])] = np.nan
+    assert analyse_design(design, values[:, None], region("ABC")).effects.curvature.difference == pytest.approx(
+        0.0, abs=1e-12
+    )
+    uneven = np.column_stack([10 + 5 * design[:, 0]] * 2)
+    uneven[8:, 0] += [0.1, -0.1, 0.1, -0.1]
+    uneven[0, 1] = np.nan
+    assert analyse_design(design, uneven, region("ABC")).effects.curvature.difference == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_error_of_a_folded_table_is_that_of_its_unused_columns():
+    """An interaction of two factors is orthogonal to main effects and to the three unused columns."""
+    design = fold_over(plackett_burman(12))[:, :8].astype(float)
+    values = (
+        20 + 2 * design[:, 0] + 5 * design[:, 0] * design[:, 1] + 0.5 * np.random.default_rng(2).standard_normal(24)
+    )
+    found = analyse_design(design, values[:, None], region("ABCDEFGH")).effects.screening
+    assert found.dummy_error.df == 3
+    assert found.dummy_error.sigma < 1.5
+    assert "A" in found.significant(adjust="none")
+
+
+def test_what_a_folded_table_leaves_unexplained_does_not_leak_into_its_main_effects():
+    design = fold_over(plackett_burman(12))[:, :8].astype(float)
+    values = 20 + 5 * design[:, [0]] * design[:, [1]] + 0.5 * np.random.default_rng(2).standard_normal((24, 2))
+    (note,) = analyse_design(design, values, region("ABCDEFGH")).effects.screening.notes
+    assert note.endswith("interactions act; the main effects are clear of those of two factors.")
+    plain = plackett_burman(12)[:, :8].astype(float)
+    (note,) = analyse_design(plain, values[:12], region("ABCDEFGH")).effects.screening.notes
+    assert note.endswith("interactions leak into the main effects.")
 
 
 def test_box_behnken_of_four_factors_is_solved_for_a_target():

@@ -170,6 +170,12 @@ def test_a_name_that_is_another_factor_s_letter_is_the_name(tmp_path):
     assert analysed(tmp_path, runs, NAMED_AS_LETTERS, terms=("P", "A")).analysis.model.anova.r_squared < 0.01
 
 
+def test_a_factor_called_e_is_no_exponent():
+    factors = tuple(make_factor(name, -1.0, 1.0, "", None, "factor") for name in "ABCDE")
+    assert coded_constraint("2E+3B<=10", factors) == pytest.approx((0.0, 3.0, 0.0, 0.0, 2.0, 10.0))
+    assert coded_constraint("2e1 A<=10", factors[:2]) == pytest.approx((20.0, 0.0, 10.0))
+
+
 def test_a_constraint_on_a_name_that_is_another_factor_s_letter_is_on_the_name():
     factors = tuple(make_factor(name, 0.0, 1.0, "", None, "factor") for name in "TCP")
     assert coded_constraint("C <= 0.5", factors) == pytest.approx((0.0, 0.5, 0.0, 0.0))
