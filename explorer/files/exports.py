@@ -17,7 +17,7 @@ from explorer.errors import CommandError
 from explorer.live.frames import Frame
 from explorer.scene.meshes import Triangles, body_triangles
 from solver.scenes.insertion import rotation_matrix
-from solver.scenes.scene import Scene
+from solver.scenes.scene import Scene, actual
 
 MM = 1e3
 MOST_TRIANGLES = 4_000_000
@@ -28,15 +28,15 @@ COLUMNS = ("body", "component", "mass_kg", "size", "x_m", "y_m", "z_m", "qw", "q
 def bodies_csv(frame: Frame, scene: Scene) -> str:
     """One row per body that has entered, in order of entry.
 
-    ``size`` is the linear size relative to the declared one; x, y, z the centre of mass [m]; q the orientation of the
-    principal frame; ``in_domain`` 0 for a body that rolled away and was taken out.
+    ``size`` is the linear size relative to that of its component; x, y, z the centre of mass [m]; q the orientation of
+    the principal frame; ``in_domain`` 0 for a body that rolled away and was taken out.
     """
-    text = io.StringIO()
+    text, bodies = io.StringIO(), actual(scene).bodies
     table = csv.writer(text, lineterminator="\n")
     table.writerow(COLUMNS)
     rows = zip(frame.component, frame.scale, frame.position, frame.quaternion, frame.inside, strict=True)
     for k, (component, scale, position, quaternion, inside) in enumerate(rows):
-        body = scene.bodies[component]
+        body = bodies[component]
         numbers = (body.mass * float(scale) ** 3, *map(float, (scale, *position, *quaternion)))
         table.writerow((k, body.name, *(f"{number:.7g}" for number in numbers), int(inside)))
     return text.getvalue()
@@ -47,7 +47,7 @@ def bodies_stl(frame: Frame, scene: Scene) -> bytes:
 
     Raises CommandError where there is no body yet, and for more than ``MOST_TRIANGLES`` triangles.
     """
-    shapes = [body_triangles(body) for body in scene.bodies]
+    shapes = [body_triangles(body) for body in actual(scene).bodies]
     chosen = np.flatnonzero(frame.inside)
     triangles = sum(len(shapes[frame.component[k]].faces) for k in chosen)
     if not triangles:

@@ -38,7 +38,7 @@ from explorer.live.solver_process import SolverProcess
 from explorer.scene.source import SceneSource
 from solver.params import ParameterError
 from solver.pours.disturbance import PlateMotion, Pull
-from solver.scenes.scene import Scene, body_counts, canonical, parameters, poured_mass, with_values
+from solver.scenes.scene import Scene, actual, body_counts, canonical, parameters, poured_mass, with_values
 
 SPEED_RANGE = (0.01, 10.0)
 """Allowed ratio of simulated to wall time."""
@@ -68,7 +68,7 @@ class Session:
 
         Raises ParameterError for a scene with more bodies than a frame holds.
         """
-        bodies = sum(body_counts(scene))
+        bodies = sum(body_counts(actual(scene)))
         if bodies > MAX_BODIES:
             path = "rig.mass" if "rig.mass" in parameters(scene) else "rig"
             raise ParameterError(

@@ -19,7 +19,7 @@ from PIL import Image, ImageDraw, ImageFont
 from explorer.live.frames import Frame
 from explorer.scene.meshes import GATE_NAME, PLATE_NAME, body_triangles, rig_poses, rig_triangles, rim_circles
 from explorer.viewer.palette import GLASS, HALO, PLATE, RIM, RING, TEXT, Colour, component_colour, linear
-from solver.scenes.scene import Scene, body_counts
+from solver.scenes.scene import Scene, actual, body_counts
 
 Array = npt.NDArray[np.float64]
 
@@ -53,11 +53,12 @@ class SceneNodes:
     """Nodes of one scene, below the node ``root``; :meth:`show` moves the bodies and the surfaces of the rig."""
 
     def __init__(self, server: viser.ViserServer, scene: Scene, root: str = "") -> None:
-        self.meshes = [body_triangles(body) for body in scene.bodies]
+        poured = actual(scene)  # effects of the set-up change shapes, sizes and numbers
+        self.meshes = [body_triangles(body) for body in poured.bodies]
         """Surface of a body of each component, in its own frame."""
         self.widest = math.inf
         """Largest radius of the plate [m], whatever lies farther out; set if another pile stands beside it."""
-        numbers = body_counts(scene)
+        numbers = body_counts(poured)
         self.bodies = BodyNodes(
             server,
             [
@@ -275,7 +276,7 @@ def tube_places(
 
 def another_set_up(one: Scene, other: Scene) -> bool:
     """Whether bodies or rig differ: they are then drawn by other nodes, and their piles are not compared."""
-    return (one.bodies, one.rig) != (other.bodies, other.rig)
+    return (actual(one).bodies, one.rig) != (actual(other).bodies, other.rig)
 
 
 class BodyNodes:

@@ -199,7 +199,12 @@ class Pour:
         self._wake()
 
     def pull(self, pull: Pull | None) -> None:
-        """Pull one body from now on, or none; wakes the pour up. Raises ParameterError for a body that is not there."""
+        """Pull one body from now on, or none; wakes the pour up, unless there is nothing to let go.
+
+        Raises ParameterError for a body that is not there.
+        """
+        if pull is None and self._pull is None:
+            return
         if pull is not None and not 0 <= pull.body < self.entered:
             raise ParameterError(f"pull: there is no body {pull.body + 1}; {self.entered} have entered")
         self._pull, self.disturbed = pull, True

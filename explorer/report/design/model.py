@@ -212,7 +212,8 @@ def _errors(part: DrawnEffects) -> list[tuple[str, str]]:
                     title,
                     f"{of} = {observed(response, error.sigma)}, {counted(error.df, 'degree of freedom')}; margin of "
                     f"one effect {observed(response, error.margin)}, of all "
-                    f"{observed(response, error.margin_bonferroni)}; seen with chance 0.8: {observed(response, error.smallest_detectable_effect)}",
+                    f"{observed(response, error.margin_bonferroni)}; seen with chance 0.8: "
+                    f"{observed(response, error.smallest_detectable_effect)}",
                 )
             )
     return found

@@ -11,6 +11,7 @@ from explorer.scene.meshes import body_triangles
 from explorer.viewer.palette import Colour
 from explorer.viewer.scene_nodes import BodyNodes, DrawnComponent
 from solver import Scene, body_counts
+from solver.scenes.scene import actual
 
 COLOUR: Colour = (170, 178, 186)
 OPACITY = 0.28
@@ -40,7 +41,8 @@ class Ghost:
     def leave(self, rest: Rest, frame: Frame) -> None:
         """Draw ``rest`` as last seen, in ``frame``, in place of an earlier ghost."""
         self.take_away()
-        kinds = zip(rest.scene.bodies, body_counts(rest.scene), strict=True)
+        poured = actual(rest.scene)
+        kinds = zip(poured.bodies, body_counts(poured), strict=True)
         self._nodes = BodyNodes(
             self._server, [DrawnComponent(body_triangles(body), COLOUR, most) for body, most in kinds], ROOT
         )

@@ -10,7 +10,7 @@ import trimesh
 
 from explorer.errors import CommandError
 from explorer.files.exports import bodies_csv, bodies_stl
-from solver import load_material
+from solver import load_material, with_values
 from tests.explorer.beads import MASS, RADIUS, bead_scene
 from tests.explorer.viewer.page_session import frame_of
 
@@ -26,6 +26,12 @@ def test_the_table_holds_every_body_in_order_of_entry():
     assert [float(row["mass_kg"]) for row in rows] == pytest.approx([MASS, MASS / 8, MASS], rel=1e-6)
     assert [row["in_domain"] for row in rows] == ["1", "1", "0"]
     assert {row["component"] for row in rows} == {"bead"}
+
+
+def test_masses_are_those_of_the_bodies_that_are_poured():
+    lighter = with_values(BEADS, {"effect.density_error.excess": -0.3})
+    (row,) = csv.DictReader(io.StringIO(bodies_csv(frame_of([0], PLACES[:1], [True]), lighter)))
+    assert float(row["mass_kg"]) == pytest.approx(0.7 * MASS, rel=1e-6)
 
 
 def test_the_mesh_has_the_bodies_where_they_are_in_millimetres():

@@ -46,8 +46,10 @@ from explorer.viewer.palette import (
     linear_all,
     mapped,
 )
-from explorer.viewer.scene_nodes import SceneNodes, tube_places
+from explorer.viewer.scene_nodes import SceneNodes, another_set_up, tube_places
+from solver import body_counts, load_material, with_values
 from solver.scenes.insertion import rotation_matrix
+from solver.scenes.scene import actual
 from tests.explorer.beads import bead_scene
 from tests.explorer.viewer.person import Person
 
@@ -294,6 +296,19 @@ def test_only_what_frames_do_not_carry_is_asked_for():
     assert not Look(cut_away="x above", rig_opacity=0.5).needs_details
     assert Look(chains=True).needs_details
     assert all(Look(colour_by=name).needs_details for name in QUANTITIES)
+
+
+def test_bodies_are_drawn_as_they_are_poured(server):
+    """Lighter ones are more, and a stretched one is longer, than declared."""
+    lighter = with_values(bead_scene(), {"effect.density_error.excess": -0.3})
+    (node,) = SceneNodes(server, lighter).bodies.nodes
+    assert len(node.batched_scales) == sum(body_counts(actual(lighter))) > sum(body_counts(lighter))
+    seeds = load_material("sunflower_extract")
+    longer = with_values(seeds, {"effect.shape_elongation.elongation": 0.5})
+    lengths = [np.ptp(SceneNodes(server, one).meshes[0].vertices, axis=0).max() for one in (seeds, longer)]
+    assert lengths[1] > 1.2 * lengths[0]
+    assert another_set_up(longer, seeds)
+    assert not another_set_up(with_values(longer, {"pair.seed.seed.static_friction": 0.1}), longer)
 
 
 def test_nodes_are_painted_faded_and_hidden(server):

@@ -62,6 +62,13 @@ def advance(pour, seconds):
         left -= steps
 
 
+def test_letting_go_of_nothing_disturbs_nothing(resting):
+    resting.pull(None)
+    assert not resting.disturbed
+    assert resting.ended[0] == Outcome.AT_REST
+    assert resting.steps_due() == 0
+
+
 def test_the_plate_ends_where_it_began_though_steps_grow_in_its_last_piece(resting):
     softer = with_values(slab(), {"material.rubber.shear_modulus": 1e6, "material.steel.shear_modulus": 1e6})
     before, piece = resting.dt, TAP.duration / PIECES
