@@ -21,6 +21,7 @@ from explorer.live.details import DetailWriter
 from explorer.live.frames import FrameWriter
 from explorer.live.history import History, Moment
 from explorer.live.messages import (
+    BackTo,
     Command,
     Event,
     MovePlate,
@@ -99,6 +100,9 @@ class LivePour:
                 self._throttle.restart(clock.perf_counter(), self._pour.time)
             case StepBack(duration=duration):
                 self._go_back(self._pour.time - duration)
+            case BackTo(time=time):
+                if time < self._pour.time:
+                    self._go_back(time)
             case SetSpeed(factor=factor):
                 self._throttle.speed = factor
                 self._throttle.restart(clock.perf_counter(), self._pour.time)

@@ -73,6 +73,13 @@ class StepBack:
 
 
 @dataclass(frozen=True)
+class BackTo:
+    """Go back to ``time`` [s], or to the earliest moment that is kept, and pause there; a later moment is ignored."""
+
+    time: float
+
+
+@dataclass(frozen=True)
 class SetParameters:
     """New values (SI, or text with a unit) of live parameters by path, applied together."""
 
@@ -115,7 +122,19 @@ class Close:
 
 
 Command = (
-    Start | Play | Pause | Step | RunTo | StepBack | SetParameters | MovePlate | SetPull | SetSpeed | Watch | Close
+    Start
+    | Play
+    | Pause
+    | Step
+    | RunTo
+    | StepBack
+    | BackTo
+    | SetParameters
+    | MovePlate
+    | SetPull
+    | SetSpeed
+    | Watch
+    | Close
 )
 
 

@@ -16,6 +16,7 @@ from explorer.errors import CommandError
 from explorer.live.details import Details
 from explorer.live.frames import MAX_BODIES, Frame
 from explorer.live.messages import (
+    BackTo,
     Command,
     Event,
     Failure,
@@ -118,6 +119,10 @@ class Session:
         The pour pauses there, and repeats the same bits until something is changed.
         """
         self._send(StepBack(self._present().scene.numerics.sample_interval if duration is None else duration))
+
+    def back_to(self, time: float) -> None:
+        """Go back to ``time`` [s] as :meth:`step_back` does, whatever was run or asked for in the meantime."""
+        self._send(BackTo(time))
 
     def set_speed(self, factor: float) -> None:
         """Aim at ``factor`` seconds of simulated time per second."""

@@ -220,7 +220,7 @@ def _come_to(session: Session, second: Status, time: float) -> None:
     elif second.state == SessionState.RUNNING:
         session.pause()
     elif ahead > hair and second.earliest <= time:
-        session.step_back(ahead)
+        session.back_to(time)
 
 
 def stand_aside(camera: Any, away: Array, scene: Scene, middle: float) -> CameraView:

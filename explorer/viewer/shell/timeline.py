@@ -61,7 +61,7 @@ class Timeline(Panel):
         if math.isfinite(status.earliest):
             moment = checked(wanted, 0.0, math.inf, "time")
             if moment < status.time:
-                self._session.step_back(status.time - max(moment, status.earliest))
+                self._session.back_to(max(moment, status.earliest))
 
     def _set_speed(self, factor: object) -> None:
         self._session.set_speed(checked(factor, SLOWEST, FASTEST, "speed"))

@@ -10,6 +10,7 @@ from explorer.live.details import DetailWriter, detail_reader, shared_details
 from explorer.live.frames import FrameReader, FrameWriter, shared_block
 from explorer.live.history import History, thinnest
 from explorer.live.messages import (
+    BackTo,
     Event,
     MovePlate,
     Pause,
@@ -130,6 +131,18 @@ def test_going_back_and_on_ends_in_the_same_bits(live):
     assert repeated.time == again.time
     np.testing.assert_array_equal(repeated.position, again.position)
     np.testing.assert_array_equal(repeated.quaternion, again.quaternion)
+
+
+def test_moments_asked_for_one_after_the_other_are_moments_of_the_pour(live):
+    """Two clicks on the timeline before the first is answered; steps back would add up."""
+    first, begun = run(live, 0.3)
+    run(live, 0.2)
+    live.pour.obey(BackTo(begun.time + 0.1))
+    live.pour.obey(BackTo(begun.time))
+    assert (live.pour.status().state, live.pour.status().time) == (SessionState.PAUSED, begun.time)
+    np.testing.assert_array_equal(live.reader.newest().position, first.position)
+    live.pour.obey(BackTo(begun.time + 0.1))
+    assert live.pour.status().time == begun.time
 
 
 def test_a_step_forward_and_one_back_lead_to_the_same_moment(live):

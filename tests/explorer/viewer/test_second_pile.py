@@ -51,8 +51,8 @@ class FakeSession:
     def play(self):
         self.told.append("play")
 
-    def step_back(self, duration):
-        self.told.append(("back", pytest.approx(duration)))
+    def back_to(self, time):
+        self.told.append(("back to", pytest.approx(time)))
 
     def set_speed(self, factor):
         self.told.append(("speed", factor))
@@ -160,8 +160,8 @@ def test_where_the_first_stands_still_the_second_comes_to_its_moment(bench):
     first = replace(bench.first.now, state=SessionState.PAUSED, time=0.5)
     for time, state, asked in (
         (0.7, SessionState.RUNNING, "pause"),
-        (0.7, SessionState.PAUSED, ("back", 0.2)),
-        (0.7, SessionState.ENDED, ("back", 0.2)),
+        (0.7, SessionState.PAUSED, ("back to", 0.5)),
+        (0.7, SessionState.ENDED, ("back to", 0.5)),
         (0.3, SessionState.PAUSED, "play"),
         (0.3, SessionState.RUNNING, None),
         (0.502, SessionState.PAUSED, None),
