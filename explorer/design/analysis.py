@@ -23,6 +23,7 @@ from doe.analysis.steepest_ascent import Region
 from doe.analysis.surface import Blocks
 from doe.analysis.surface_anova import CONSTANT, FULL
 from doe.designs import DESIGNS, factor_letters
+from doe.designs.mixture import Mixture
 from doe.designs.morris import Morris
 from doe.errors import StatisticsError
 from explorer.design.choices import ModelOrder, Reduction, Surrogate
@@ -42,6 +43,8 @@ RARE = 0.01
 """p below which a pattern in the order of the residuals is worth a note."""
 SAME = 1e-9
 """Coded levels that differ by less count as one."""
+ROUNDED = 0.03
+"""Share of a mixture's sum by which rounded amounts may miss it."""
 FAR = 2.5
 """Half-widths from the middle of a factor's range beyond which a level is probably a slip: the star points of rotatable
 central composite designs of up to five factors are 2^(5/4) = 2.4 away (Box and Hunter 1957, Ann. Math. Stat. 28,
@@ -111,6 +114,8 @@ def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
     if runs.design == Morris.name and not (asked_model or order.target is not None or order.block):
         found = _elementary(runs, region, order)
         return _result(runs, order, replace(found, notes=(*found.notes, *_run_notes(runs, region, found))))
+    if runs.design == Mixture.name:
+        _refuse_rounded(runs, region, order.sheet)
     if _whole(runs, region) and order.surrogate is None:
         return _result(runs, order, _mixture(runs, region, order))
     reference = np.array([factor.reference for factor in runs.factors])
@@ -184,6 +189,18 @@ def _whole(runs: Runs, region: Region) -> bool:
         return False  # an amount cannot be below zero
     one_sum = bool(np.ptp(levels.sum(axis=1)) < SAME * np.abs(levels).max())
     return one_sum and bool(np.linalg.matrix_rank(levels - levels.mean(axis=0), tol=1e-6) == len(runs.factors) - 1)
+
+
+def _refuse_rounded(runs: Runs, region: Region, sheet: str) -> None:
+    """Raise CommandError for a mixture whose parts add up to nearly the same: of 0.33, 0.33 and 0.33 a hundredth is
+    missing, and no model could tell it from a part.
+    """
+    sums = region.natural(runs.coded[~np.isnan(runs.responses).all(axis=1)]).sum(axis=1)
+    if SAME * np.abs(sums).max() <= np.ptp(sums) <= ROUNDED * np.abs(sums).max():
+        raise CommandError(
+            f"{sheet}: the parts of the mixture add up to {sums.min():.6g} … {sums.max():.6g}; allowed: the same sum "
+            "in every run; write the amounts with all their digits"
+        )
 
 
 def _mixture(runs: Runs, region: Region, order: AnalyseOrder) -> DesignAnalysis:

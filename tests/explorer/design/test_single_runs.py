@@ -182,6 +182,15 @@ def test_a_constraint_on_a_name_that_is_another_factor_s_letter_is_on_the_name()
     assert coded_constraint("B + A <= 0.5", factors) == pytest.approx((0.5, 0.5, 0.0, -0.5))
 
 
+def test_a_mixture_of_rounded_amounts_is_refused(tmp_path):
+    """As an ordinary polynomial of nearly dependent factors it would have no significant part."""
+    head = "# design | mixture\n" + "".join(f"# factor | {name} | 0 | 1\n" for name in "abc") + "a,b,c,y\n"
+    blends = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.5, 0.5, 0), (0.5, 0, 0.5), (0, 0.5, 0.5), (0.33, 0.33, 0.33)] * 2
+    runs = "".join(f"{a},{b},{c},{5 + a + 2 * b}\n" for a, b, c in blends)
+    with pytest.raises(CommandError, match=r"add up to 0\.99 … 1; allowed: the same sum in every run"):
+        analysed(tmp_path, runs, head)
+
+
 def test_a_constant_mixture_is_told_in_a_note(tmp_path):
     blends = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.5, 0.5, 0), (0.5, 0, 0.5), (0, 0.5, 0.5)] * 2
     parts = "# factor | a | 0 | 1\n# factor | b | 0 | 0.5\n# factor | c | 0 | 1\na,b,c,y\n"
