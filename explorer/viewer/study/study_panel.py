@@ -17,6 +17,7 @@ from explorer.background.output_folder import ResultFile
 from explorer.errors import CommandError
 from explorer.live.session import Session
 from explorer.photograph.target import PhotographedTarget
+from explorer.scene.source import study_source
 from explorer.study.duration import duration_text
 from explorer.study.excluded_runs import keep_excluded, load_excluded
 from explorer.study.process import PARTIAL, RESULT, QueuedStudy
@@ -213,7 +214,7 @@ class StudyPanel(Panel):
         if result is None or found is None:
             raise CommandError("this run is not in the study that is shown")
         scene, same = scene_of(result, *found)
-        self._session.restart(scene, found[1].seed)
+        self._session.start(scene, found[1].seed, study_source(Path(result.study.file)))
         if not same:
             raise CommandError("program, study file or material has changed since that run: this pour may differ")
 

@@ -80,6 +80,9 @@ class FakeSession:
     def set_parameters(self, values):
         self.asked.append(("set", values))
 
+    def start(self, scene, seed, source):
+        self.asked.append(("start", scene, seed, source))
+
     def restart(self, scene, seed=None):
         self.asked.append(("restart", scene, seed))
 

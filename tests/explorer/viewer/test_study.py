@@ -215,7 +215,9 @@ def test_a_row_of_the_board_pours_that_run_in_the_scene(table, result, tmp_path)
     table.page.channel.take(json.dumps(asked))
     assert "has changed since that run" in table.actions.carry_out()
     (poured,) = table.session.asked
-    assert (poured[0], poured[2]) == ("restart", asked["seed"])
+    assert (poured[0], poured[2]) == ("start", asked["seed"])
+    # The default, the command line and the bench twin are those of the study, whatever was poured before.
+    assert poured[3].arguments == ("sunflower_extract",)
     for factor, natural in zip(result["surface"]["factors"], result["surface"]["natural"][3], strict=True):
         assert value(poured[1], factor["path"]) == pytest.approx(natural)
     table.page.channel.take(json.dumps(asked | {"seed": -1}))
