@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from explorer.live.messages import SessionState
+from explorer.live.messages import SessionState, Status
 from explorer.units import checked
 from explorer.viewer.actions import add_keys
 from explorer.viewer.panel import AROUND, Now, PageContext, Panel
@@ -35,6 +35,8 @@ class Timeline(Panel):
     def __init__(self, page: PageContext) -> None:
         session, post = page.session, page.post
         self._page, self._session = page, session
+        self._begins_paused: int | None = None
+        """The pour that is to pause as soon as it has started, by its generation."""
         acts = {PLAY_PAUSE: self._toggle, BACK: session.step_back, STEP: session.step}
         page.channel.offer("toggle", lambda _: post(self._toggle))
         page.channel.offer("back", lambda _: post(session.step_back))
@@ -47,13 +49,21 @@ class Timeline(Panel):
         """Send the state of the pour to the browsers."""
         page = self._page
         busy = page.bench_work.busy_with or page.background.busy_with
-        page.channel.tell("timeline", timeline_state(now, page.recording.state.words, busy))
+        state = timeline_state(now, page.recording.state.words, busy)
+        page.channel.tell("timeline", {**state, "playing": state["playing"] and not self._waits_to_pause(now.status)})
 
     def _toggle(self) -> None:
-        if self._session.status().state in MOVING:
+        status = self._session.status()
+        if status.state in MOVING and not self._waits_to_pause(status):
             self._session.pause()
+            self._begins_paused = status.generation
         else:
             self._session.play()
+            self._begins_paused = None
+
+    def _waits_to_pause(self, status: Status) -> bool:
+        """Whether a pour that is still starting has been told to pause; it obeys once it has started."""
+        return status.state == SessionState.STARTING and self._begins_paused == status.generation
 
     def _seek(self, wanted: object) -> None:
         """Go back to ``wanted`` [s], with the parameters of that moment; a later moment has to be computed first."""

@@ -157,6 +157,26 @@ def at_hand(server):
     return session, context
 
 
+def test_a_pause_of_a_pour_that_is_starting_is_shown_and_taken_back(at_hand):
+    """Both would be "pause", as the pour reports nothing else before it has started."""
+    session, context = at_hand
+    session.now = replace(session.now, state=SessionState.STARTING)
+    timeline, told = Timeline(context), []
+    context.channel.tell = lambda name, state: told.append(state["playing"])
+
+    def shown():
+        timeline.show(Now(session.now))
+        return told.pop()
+
+    assert shown()
+    for playing in (False, True, False):
+        context.channel.take(json.dumps({"do": "toggle"}))
+        assert shown() is playing
+    assert session.asked == ["pause", "play", "pause"]
+    session.now = replace(session.now, generation=session.now.generation + 1)
+    assert shown()  # the next pour begins as ever
+
+
 def test_the_timeline_goes_back_to_a_moment_that_is_kept_and_no_further(at_hand):
     session, context = at_hand
     Timeline(context)
