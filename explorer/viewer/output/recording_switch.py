@@ -86,6 +86,8 @@ class RecordingSwitch:
         self._recorder: Recorder | ScenePlayback | None = None
         self._path: Path | None = None
         self._pours: tuple[RecordedPour, ...] = ()
+        self._unwritten: ScenePlayback | None = None
+        """A web page that has ended and is not in its file yet."""
         self._began = 0.0
 
     @property
@@ -135,7 +137,7 @@ class RecordingSwitch:
             raise CommandError("recording: none is running")
         if isinstance(recorder, ScenePlayback):
             # Refused while another job is being done; the recording then continues.
-            self._background.start("packing the recording", lambda: write_whole(path, recorder.html()), lambda _: None)
+            self._pack(path, recorder)
             self._recorder = None
             return
         # In this order: whoever sees that the recording has ended may open the files.
@@ -166,6 +168,9 @@ class RecordingSwitch:
         """
         if self.running or self._background.busy_with:
             raise CommandError("recording: stop it first, and wait until it is written")
+        if self._unwritten is not None and self._path is not None:
+            self._pack(self._path, self._unwritten)
+            raise CommandError("recording: it could not be written and is now written again; wait until that is done")
         found = [pour.path for pour in self._pours]
         if not found and self._path is not None and self._path.is_file():
             found = [self._path]  # a web page
@@ -175,14 +180,23 @@ class RecordingSwitch:
 
     def close(self) -> None:
         """End the running recording, with a complete file."""
-        recorder, self._recorder = self._recorder, None
+        recorder, self._recorder = self._recorder or self._unwritten, None
         if isinstance(recorder, ScenePlayback) and self._path is not None:
             write_whole(self._path, recorder.html())
         elif recorder is not None:
             recorder.close()
 
+    def _pack(self, path: Path, recorder: ScenePlayback) -> None:
+        """Write a web page off the loop; it is kept until that is done, in case the server ends or the disk is full."""
+
+        def written(_: object) -> None:
+            self._unwritten = None
+
+        self._unwritten = recorder
+        self._background.start("packing the recording", lambda: write_whole(path, recorder.html()), written)
+
     def _take_up(self, path: Path, recorder: Recorder | ScenePlayback) -> None:
-        self._path, self._recorder, self._pours = path, recorder, ()
+        self._path, self._recorder, self._pours, self._unwritten = path, recorder, (), None
         self._began = time.monotonic()
 
 

@@ -1,5 +1,6 @@
 """The tab of what is taken along: command line, downloads, recordings."""
 
+import errno
 import io
 import math
 import re
@@ -407,6 +408,31 @@ def test_a_web_page_that_cannot_be_packed_yet_goes_on_being_recorded(bench):
     assert bench.finished() == ""
     assert bench.record(STOP) == ""
     assert "__VISER_EMBED_DATA__" in bench.recording.files()[0].read_text()
+
+
+def test_a_web_page_that_could_not_be_written_is_written_again(bench, monkeypatch):
+    def full(path, text):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    bench.recorder.enter("Kind", HTML)
+    assert bench.record(START) == ""
+    with monkeypatch.context() as patched:
+        patched.setattr("explorer.viewer.output.recording_switch.write_whole", full)
+        assert "No space left" in bench.record(STOP)
+    assert not bench.recording.running
+    with pytest.raises(CommandError, match="is now written again"):
+        bench.recording.files()
+    assert bench.finished() == ""
+    assert "__VISER_EMBED_DATA__" in bench.recording.files()[0].read_text()
+
+
+def test_the_end_of_the_server_leaves_a_web_page_that_was_being_packed(bench, monkeypatch):
+    bench.recorder.enter("Kind", HTML)
+    assert bench.record(START) == ""
+    monkeypatch.setattr(bench.background, "start", lambda *_: None)  # a thread that ends with the server
+    bench.recording.end()
+    bench.recording.close()
+    assert "__VISER_EMBED_DATA__" in bench.recording.path.read_text()
 
 
 def test_a_kind_that_is_not_offered_is_refused(bench):
