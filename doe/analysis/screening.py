@@ -260,7 +260,10 @@ def analyse_screening(
         lenth=lenth(effects[used], alpha),
         unexplained_f=unexplained_f,
         unexplained_p=unexplained_p,
-        notes=_notes(valid, dummy_error, pure_error, pure_sigma, total, unexplained_p, _leaks(levels, names, is_dummy)),
+        notes=_notes(
+            *(valid, dummy_error, pure_error, pure_sigma, total, unexplained_p),
+            leaks=unexplained_p < 0.05 and _leaks(levels, names, is_dummy),
+        ),
     )
 
 

@@ -113,12 +113,12 @@ class Session:
         """Run to simulated ``time`` [s], then pause there; also allowed for a pour that was just started."""
         self._send(RunTo(time))
 
-    def step_back(self, duration: float | None = None) -> None:
-        """Go back by ``duration`` [s], by default one sample interval; everything is as it was then, parameters too.
+    def step_back(self) -> None:
+        """Go back by one sample interval; everything is as it was then, parameters too.
 
         The pour pauses there, and repeats the same bits until something is changed.
         """
-        self._send(StepBack(self._present().scene.numerics.sample_interval if duration is None else duration))
+        self._send(StepBack(self._present().scene.numerics.sample_interval))
 
     def back_to(self, time: float) -> None:
         """Go back to ``time`` [s] as :meth:`step_back` does, whatever was run or asked for in the meantime."""

@@ -276,7 +276,8 @@ def tube_places(
 
 def another_set_up(one: Scene, other: Scene) -> bool:
     """Whether bodies or rig differ: they are then drawn by other nodes, and their piles are not compared."""
-    return (actual(one).bodies, one.rig) != (actual(other).bodies, other.rig)
+    # Asked at every look at the pour, nearly always of one scene twice.
+    return one != other and (actual(one).bodies, one.rig) != (actual(other).bodies, other.rig)
 
 
 class BodyNodes:

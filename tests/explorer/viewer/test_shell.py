@@ -136,8 +136,8 @@ class Moved(PageSession):
     def pause(self):
         self.asked.append("pause")
 
-    def step_back(self, duration=None):
-        self.asked.append(("back", duration))
+    def step_back(self):
+        self.asked.append("back")
 
     def back_to(self, time):
         self.asked.append(("back to", time))
