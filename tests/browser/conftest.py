@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.browser.test_page import FLAGS
+from tests.browser.pages import FLAGS
 
 
 @pytest.fixture(scope="module")

@@ -20,8 +20,9 @@ from pathlib import Path
 from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 
+from tests.browser.pages import BEGUN, FLAGS
 from tests.browser.served import EXAMPLE, diagnosed, served
-from tests.browser.test_page import BEGUN, FLAGS, slider
+from tests.browser.test_page import slider
 from tests.conftest import find_chromium
 
 FOLDER, GALLERY = Path("assets/pictures"), Path("docs/pictures.md")

@@ -2,8 +2,9 @@
 
 import pytest
 
+from tests.browser.pages import PATIENCE, new_page
 from tests.browser.served import served
-from tests.browser.test_page import BEGUN, PATIENCE, SETTINGS, no_serious_fault, room, unfold
+from tests.browser.test_page import SETTINGS, no_serious_fault, room, unfold
 from tests.browser.test_photographed_target import seen, shot
 
 pytestmark = pytest.mark.browser
@@ -13,9 +14,7 @@ pytestmark = pytest.mark.browser
 def page(browser, tmp_path_factory):
     """The laboratory with the form of a design."""
     with served(*SETTINGS, data=tmp_path_factory.mktemp("data"), patience=30) as address:
-        page = browser.new_page(viewport={"width": 1280, "height": 1200})
-        page.set_default_timeout(PATIENCE)
-        page.add_init_script(BEGUN)
+        page = new_page(browser, 1280, 1200)
         page.goto(address)
         room(page, "Laboratory")
         unfold(page, "Your own design → runs")

@@ -5,8 +5,9 @@ from contextlib import contextmanager
 import pytest
 
 from explorer import load_diagnosis
+from tests.browser.pages import new_page
 from tests.browser.served import EXAMPLE, diagnosed, served
-from tests.browser.test_page import BEGUN, PATIENCE, SETTINGS, room, wait_for
+from tests.browser.test_page import SETTINGS, room, wait_for
 
 pytestmark = pytest.mark.browser
 
@@ -17,9 +18,7 @@ NODES = "() => Object.keys(window.__viserSceneTree.getState())"
 def diagnose_room(browser, data):
     """The room *Diagnose* of a person who has ``data``."""
     with served("--store", data / "runs.sqlite", *SETTINGS, data=data, patience=30) as address:
-        page = browser.new_page(viewport={"width": 1280, "height": 1400})
-        page.set_default_timeout(PATIENCE)
-        page.add_init_script(BEGUN)
+        page = new_page(browser, 1280, 1400)
         page.goto(address)
         room(page, "Diagnose")
         yield page

@@ -8,9 +8,10 @@ from doe.measurement.load import load_measurement
 from explorer.diagnosis.follow_up_tables import read_follow_up
 from explorer.diagnosis.next_folder import write_next
 from solver.assets import measurement_folder
+from tests.browser.pages import PATIENCE
 from tests.browser.test_design_page import press, write_into
 from tests.browser.test_diagnosis_page import diagnose_room
-from tests.browser.test_page import PATIENCE, no_serious_fault, wait_for
+from tests.browser.test_page import no_serious_fault, wait_for
 from tests.browser.test_photographed_target import shot
 from tests.explorer.diagnosed import result_of_case, typed
 

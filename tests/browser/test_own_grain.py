@@ -4,8 +4,9 @@ import pytest
 
 from explorer.scene.text import material_toml
 from solver import load_material, with_values
+from tests.browser.pages import new_page
 from tests.browser.served import served
-from tests.browser.test_page import PATIENCE, SETTINGS, room, unfold
+from tests.browser.test_page import SETTINGS, room, unfold
 from tests.browser.test_photographed_target import seen, shot
 
 pytestmark = pytest.mark.browser
@@ -15,8 +16,7 @@ pytestmark = pytest.mark.browser
 def page(browser, tmp_path_factory):
     """A first visit."""
     with served(*SETTINGS, data=tmp_path_factory.mktemp("data"), patience=30) as address:
-        page = browser.new_page(viewport={"width": 1280, "height": 800})
-        page.set_default_timeout(PATIENCE)
+        page = new_page(browser, 1280, 800, begun=False)
         page.goto(address)
         yield page
         page.close()

@@ -13,24 +13,12 @@ import pytest
 
 from explorer.viewer.panel import TABS
 from explorer.viewer.pour.readout import PHASE_WORDS
+from tests.browser.pages import FLAGS, PATIENCE, new_page
 from tests.browser.served import served
 from tests.explorer.background.waiting import wait_for
 
 pytestmark = pytest.mark.browser
 
-# WebGL 2 in software: there is no graphics card where tests run.
-FLAGS = [
-    "--no-sandbox",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--ignore-gpu-blocklist",
-]
 # A wide outlet close to the plate: a pour that does not jam, and a pile two bodies high.
 SMALL_POUR = (
     "body.spheres=coarse",
@@ -40,8 +28,6 @@ SMALL_POUR = (
     "rig.outlet_height=40mm",
 )
 SETTINGS = tuple(part for one in SMALL_POUR for part in ("--set", one))
-BEGUN = "try { localStorage.setItem('explorer-begun', 'yes') } catch { /* an empty page has none */ }"
-"""Of a browser that has seen the start dialogue."""
 POSITIONS = """() => Object.entries(window.__viserSceneTree.getState())
     .filter(([name, node]) => /^.bodies.\\d+$/.test(name) && node?.message?.props?.batched_positions)
     .sort().flatMap(([name, node]) => Array.from(node.message.props.batched_positions))"""
@@ -49,8 +35,6 @@ MIDDLE = {"x": 400, "y": 400, "width": 240, "height": 240}
 """Of the scene [px]."""
 SERIOUS = ("serious", "critical")
 """Impacts of what axe-core finds."""
-PATIENCE = 120_000
-"""Milliseconds: software rendering, a solver that compiles its kernels and other work share two cores."""
 
 
 @pytest.fixture(scope="module")
@@ -67,12 +51,7 @@ def page(address, chromium):
 
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
-        page = browser.new_page(viewport={"width": 1280, "height": 900})
-        page.set_default_timeout(PATIENCE)
-        page.complaints = []
-        page.on("console", lambda said: page.complaints.append(said.text) if said.type == "error" else None)
-        page.on("pageerror", lambda error: page.complaints.append(str(error)))
-        page.add_init_script(BEGUN)
+        page = new_page(browser)
         page.goto(address)
         room(page, "Set-up")
         page.get_by_text("Static friction").filter(visible=True).first.wait_for()
@@ -232,9 +211,7 @@ def test_the_r_key_pours_anew_with_the_parameters_in_force(page):
 
 
 def test_a_slider_moved_by_keyboard_in_one_browser_is_seen_in_another(page, address):
-    second = page.context.browser.new_page(viewport={"width": 1280, "height": 900})
-    second.set_default_timeout(PATIENCE)
-    second.add_init_script(BEGUN)
+    second = new_page(page.context.browser)
     second.goto(address)
     # The notice stays for seconds only.
     second.get_by_text(re.compile(r"You are browser \d+")).wait_for()
@@ -258,9 +235,7 @@ def test_a_slider_moved_by_keyboard_in_one_browser_is_seen_in_another(page, addr
 def test_a_pour_in_a_link_is_offered_in_words_and_poured_by_a_click_only(page, address):
     text = "pour=sunflower_extract&set=body.spheres%3Dcoarse&set=rig.mass%3D10g&seed=4&time=0.01"
     told = page.locator("#timeline .event[title*='seed 4']")
-    second = page.context.browser.new_page(viewport={"width": 1280, "height": 900})
-    second.set_default_timeout(PATIENCE)
-    second.add_init_script(BEGUN)
+    second = new_page(page.context.browser)
     second.goto(f"{address}#{text}")
     offer = second.get_by_text("This link holds another pour: ")
     offer.wait_for()
@@ -282,9 +257,7 @@ def test_a_pour_in_a_link_is_offered_in_words_and_poured_by_a_click_only(page, a
 
 @pytest.mark.slow
 def test_open_rooms_are_open_again_when_the_page_is_loaded_again(page, address):
-    second = page.context.browser.new_page(viewport={"width": 1280, "height": 900})
-    second.set_default_timeout(PATIENCE)
-    second.add_init_script(BEGUN)
+    second = new_page(page.context.browser)
     second.goto(address)
     opened = "() => [...document.querySelectorAll('#root [role=tab][aria-selected=true]')].map(one => one.textContent)"
     for name in ("Laboratory", "Look"):
@@ -297,9 +270,7 @@ def test_open_rooms_are_open_again_when_the_page_is_loaded_again(page, address):
 
 @pytest.mark.slow
 def test_a_room_that_is_opened_while_the_page_loads_is_not_closed_by_those_of_the_page_before(page, address):
-    second = page.context.browser.new_page(viewport={"width": 1280, "height": 900})
-    second.set_default_timeout(PATIENCE)
-    second.add_init_script(BEGUN)
+    second = new_page(page.context.browser)
     # Looks for what is to be opened again come twenty times as slowly, as on a busy machine, and are counted.
     second.add_init_script("""
         try { sessionStorage.setItem('explorer-rooms', '["Calibrate"]') } catch { /* an empty page has none */ }
@@ -317,9 +288,7 @@ def test_a_room_that_is_opened_while_the_page_loads_is_not_closed_by_those_of_th
 
 
 def test_rooms_are_reached_in_the_window_of_a_phone(page, address):
-    phone = page.context.browser.new_page(viewport={"width": 390, "height": 844}, has_touch=True)
-    phone.set_default_timeout(PATIENCE)
-    phone.add_init_script(BEGUN)
+    phone = new_page(page.context.browser, 390, 844, has_touch=True)
     phone.goto(address)
     phone.get_by_role("tab", name="Controls").wait_for()
     for name in ("Calibrate", "Controls", "Reports"):

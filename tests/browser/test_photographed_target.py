@@ -7,8 +7,9 @@ from contextlib import contextmanager
 import pytest
 
 from explorer.project.project import new_project
+from tests.browser.pages import PATIENCE, new_page
 from tests.browser.served import served
-from tests.browser.test_page import BEGUN, PATIENCE, SETTINGS, no_serious_fault, room, unfold
+from tests.browser.test_page import SETTINGS, no_serious_fault, room, unfold
 
 pytestmark = pytest.mark.browser
 
@@ -45,16 +46,11 @@ def project(tmp_path):
 def opened(browser, project):
     """The page; its console has nothing to complain about."""
     with served(project, *SETTINGS, data=project.parent, patience=30) as address:
-        page = browser.new_page(viewport={"width": 1280, "height": 800})
-        page.set_default_timeout(PATIENCE)
-        complaints = []
-        page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.add_init_script(BEGUN)
+        page = new_page(browser, 1280, 800)
         page.goto(address)
         yield page
         page.close()
-        assert complaints == []
+        assert page.complaints == []
 
 
 def seen(page, text):

@@ -5,7 +5,8 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from tests.browser.test_page import BEGUN, PATIENCE, unfold
+from tests.browser.pages import new_page
+from tests.browser.test_page import unfold
 from tests.browser.test_study_page import address, data, opened  # noqa: F401
 from tests.explorer.report.test_charts_stay_private import PAGES
 
@@ -25,14 +26,12 @@ LOCAL_SCHEMES = {"file", "data", "blob"}
 @pytest.fixture
 def page(browser):
     """An empty page; addresses that it asks for, sockets included, are collected in ``page.asked``."""
-    context = browser.new_context(viewport={"width": 1280, "height": 1400})
-    page = context.new_page()
-    page.set_default_timeout(PATIENCE)
+    page = new_page(browser, 1280, 1400)
     page.asked = []
-    context.on("request", lambda request: page.asked.append(request.url))
+    page.context.on("request", lambda request: page.asked.append(request.url))
     page.on("websocket", lambda socket: page.asked.append(socket.url))
     yield page
-    context.close()
+    page.close()
 
 
 def foreign(addresses):
@@ -64,7 +63,6 @@ def test_a_report_offers_no_upload_and_asks_no_other_host(kind, page, tmp_path):
 
 
 def test_the_live_page_offers_no_upload_and_asks_no_other_host(page, address):  # noqa: F811
-    page.add_init_script(BEGUN)
     opened(page, address)
     # The board in its frame, then the profiler, whose enlarged chart is drawn anew.
     frame = page.frame_locator('iframe[title="Study"]')

@@ -6,9 +6,10 @@ import pytest
 
 from explorer.recordings.pour_log import PourLog
 from explorer.scene.file import load_scene
+from tests.browser.pages import FLAGS, new_page
 from tests.browser.served import served
 from tests.browser.test_look import colours, press
-from tests.browser.test_page import FLAGS, PATIENCE, positions, slider, wait_for
+from tests.browser.test_page import positions, slider, wait_for
 from tests.explorer.recordings.test_pour_log import poses
 
 pytestmark = pytest.mark.browser
@@ -34,8 +35,7 @@ def page(chromium, tmp_path_factory):
             log.frame(0.02 * k, state_at(k), {"angle_of_repose_deg": 20.0 + 0.1 * k})
     with served("--replay", path) as address, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
-        page = browser.new_page(viewport={"width": 1280, "height": 900})
-        page.set_default_timeout(PATIENCE)
+        page = new_page(browser)
         page.goto(address)
         page.get_by_text("rise.rrd").first.wait_for()
         yield page

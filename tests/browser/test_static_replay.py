@@ -17,7 +17,7 @@ from PIL import Image
 from explorer.recordings.pour_log import PourLog
 from explorer.recordings.replay import replay_server
 from explorer.scene.file import load_scene
-from tests.browser.test_page import FLAGS, PATIENCE
+from tests.browser.pages import FLAGS, new_page
 from tests.explorer.background.waiting import wait_for
 from tests.explorer.recordings.test_pour_log import poses
 
@@ -59,8 +59,7 @@ def page(chromium, folder):
         threading.Thread(target=server.serve_forever, daemon=True).start()
         address = f"http://127.0.0.1:{server.server_address[1]}/"
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
-        page = browser.new_page(viewport={"width": 1000, "height": 700})
-        page.set_default_timeout(PATIENCE)
+        page = new_page(browser, 1000, 700)
         page.strangers, page.broken = [], []
 
         def refuse(route):
@@ -68,7 +67,6 @@ def page(chromium, folder):
             route.abort()
 
         page.route(lambda url: not url.startswith((address, "blob:", "data:")), refuse)
-        page.on("pageerror", lambda error: page.broken.append(str(error)))
         page.goto(address)
         yield page
         browser.close()

@@ -7,9 +7,10 @@ import time
 
 import pytest
 
+from tests.browser.pages import FLAGS, PATIENCE, new_page
 from tests.browser.served import served
 from tests.browser.test_design_page import write_into
-from tests.browser.test_page import BEGUN, FLAGS, PATIENCE, SETTINGS, positions, room, slider, unfold, wait_for
+from tests.browser.test_page import SETTINGS, positions, room, slider, unfold, wait_for
 from tests.browser.test_photographed_target import shot
 from tests.explorer import reported_studies
 
@@ -45,12 +46,7 @@ def page(address, chromium):
 
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
-        page = browser.new_page(viewport={"width": 1280, "height": 1400})
-        page.set_default_timeout(PATIENCE)
-        page.complaints = []
-        page.add_init_script(BEGUN)
-        page.on("console", lambda said: page.complaints.append(said.text) if said.type == "error" else None)
-        page.on("pageerror", lambda error: page.complaints.append(str(error)))
+        page = new_page(browser, 1280, 1400)
         opened(page, address)
         yield page
         if shot := os.environ.get("REPOSE_SCREENSHOT"):

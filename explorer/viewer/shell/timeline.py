@@ -20,6 +20,8 @@ MOVING = (SessionState.RUNNING, SessionState.STARTING)
 SLOWEST, FASTEST = 0.05, 2.0
 """Range of the speed: simulated seconds per second."""
 SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0)
+FIRST_MOMENT = 1e-3
+"""Time [s] before which no moment but the beginning is kept; longer than one step."""
 MOST_EVENTS = 60
 """Events on the timeline at most; older ones are left out."""
 PREVIEWED = "recording of this pour, while the solver loads"
@@ -82,7 +84,8 @@ def timeline_state(now: Now, recording: str, busy: str = "") -> Mapping[str, Any
     the same for work beside the pour.
     """
     status = now.status
-    earliest = status.earliest if math.isfinite(status.earliest) else 0.0
+    # A pour is kept from after its first step on; it began before, and so did what is said of its beginning.
+    earliest = status.earliest if status.earliest >= FIRST_MOMENT else 0.0
     mine = [event for event in now.events if event.generation == status.generation and event.time <= status.time]
     return {
         "time": status.time,

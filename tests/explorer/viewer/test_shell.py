@@ -212,6 +212,15 @@ def test_the_timeline_shows_this_pour_s_events_up_to_now():
     json.dumps(state, allow_nan=False)
 
 
+def test_the_beginning_is_on_the_timeline_of_a_pour_that_is_kept_from_its_first_step_on():
+    status = Status(SessionState.PAUSED, "", SCENE, 1, 2, 1.0, time=0.01, earliest=7e-6)
+    now = Now(status, events=[Event(2, 0.0, "poured anew")])
+    state = timeline_state(now, "")
+    assert (state["earliest"], state["events"][0]["time"]) == (0.0, 0.0)
+    later = timeline_state(Now(replace(status, earliest=0.004), events=now.events), "")
+    assert later["earliest"] == 0.004
+
+
 def test_the_timeline_says_what_is_done_beside_the_pour(at_hand):
     session, context = at_hand
     timeline = Timeline(context)
