@@ -81,7 +81,8 @@ def export(
         try:
             # A longer feed has to come to its end in the pour made here, or a deck would go on without the rest.
             longest = min(time, parameters(scene)["numerics.max_time"].high)
-            scene = with_values(scene, {"numerics.max_time": longest})
+            duration = 0.0 if target.goes_on else min(scene.numerics.duration, longest)
+            scene = with_values(scene, {"numerics.max_time": longest, "numerics.duration": duration})
         except ParameterError as error:
             raise CommandError(f"--time {time:g}: {error}") from None
     target.check(scene)

@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from explorer.errors import CommandError
 from explorer.export.target import ExportOrder, ExportTarget
+from explorer.outcomes import outcome_text
 from solver import Body, Entries, Record, Scene
 from solver.effects.rolling_resistance import RollingResistance
 from solver.laws import HertzMindlin, LinearSpringDashpot
@@ -137,11 +138,13 @@ class DeckTarget(ExportTarget):
         record = run_pour(order.scene, order.seed)
         deck = deck_of(record, order.time)
         self.write_deck(folder, deck)
-        missing, why = sum(body_counts(order.scene)) - deck.bodies, "the time was up; state a longer --time"
-        if order.time is None and record.outcome != Outcome.TIME_LIMIT:
+        missing, why = sum(body_counts(record.scene)) - deck.bodies, "the time was up; state a longer --time"
+        if record.outcome != Outcome.TIME_LIMIT:
             why = f"the pour here ended ({record.outcome.replace('_', ' ')})"
         cut = f" ({missing} more had not entered when {why})" if missing else ""
-        return f"{deck.bodies} bodies{cut}, {deck.steps} steps of {deck.dt:.4g} s; how to run it: README.txt"
+        broke = f"; the pour here broke off: {outcome_text(record.outcome, record.message)}"
+        broke = broke if record.outcome.unstable else ""
+        return f"{deck.bodies} bodies{cut}, {deck.steps} steps of {deck.dt:.4g} s; how to run it: README.txt{broke}"
 
     def write_deck(self, folder: Path, deck: Deck) -> None:
         """Write a deck into an existing folder."""

@@ -38,6 +38,8 @@ Array = npt.NDArray[np.float64]
 INPUT = "in.liggghts"
 LEAST_RESTITUTION = 0.05
 """LIGGGHTS refuses coefficients of restitution up to and including this one."""
+SLOWEST_CHARACTERISTIC = 0.01
+"""LIGGGHTS in SI units refuses slower characteristic velocities [m/s]."""
 SEEDS = (15485863, 15485867, 32452843)
 """Primes for templates, distributions and insertion, which must differ; no random draw affects the result."""
 CUBE = 1e-10
@@ -95,6 +97,12 @@ class Liggghts(DeckTarget):
         for body in scene.bodies:
             _check_clump(body.name, len(body.clump.radii))
         _replaced(pair_tables(scene)[1])
+        speed = scene.contact.characteristic_velocity
+        if scene.contact.law == LinearSpringDashpot.name and speed < SLOWEST_CHARACTERISTIC:
+            raise CommandError(
+                f"contact.characteristic_velocity: {speed:g} m/s; "
+                f"allowed by LIGGGHTS: from {SLOWEST_CHARACTERISTIC:g} on"
+            )
 
     def write_deck(self, folder: Path, deck: Deck) -> None:
         """Write a deck into an existing folder."""

@@ -21,6 +21,7 @@ from explorer.errors import CommandError
 from explorer.export.liggghts import unclamped_restitution
 from explorer.export.target import ExportOrder, ExportTarget
 from solver import Body, Scene
+from solver.effects import Effect
 from solver.laws import HertzMindlin, LinearSpringDashpot
 from solver.scenes.material import Pair
 from solver.scenes.scene import actual
@@ -30,6 +31,8 @@ DAMPING_OF = {
     HertzMindlin.name: "Thornton, Cummins & Cleary (2013)",
     LinearSpringDashpot.name: "Schwager & Poeschel (2007)",
 }
+OF_THE_RIG = ("plate_tilt", "funnel_offset")
+"""Effects that turn gravity or move the rig; the other set-up effects are in bodies and materials."""
 ROLLING, KINETIC = "rolling_resistance", "kinetic_friction"
 
 README = """\
@@ -55,20 +58,21 @@ def write_material_table(folder: Path, scene: Scene) -> None:
 
     Raises CommandError for a contact law whose conventions are not known here.
     """
-    scene = actual(scene)
+    declared, scene = scene, actual(scene)
     if scene.contact.law not in LAWS:
         raise CommandError(f"contact.law: {scene.contact.law!r} cannot be exported to edem; allowed: {', '.join(LAWS)}")
+    others = [effect for effect in scene.effects if effect.on and effect.name not in (ROLLING, KINETIC)]
+    others += [effect for effect in declared.effects if effect.on and effect.name in OF_THE_RIG]
     tables = {
         "materials.csv": _materials(scene),
         "interactions.csv": _interactions(scene),
         "bodies.csv": _bodies(scene),
-        "conventions.csv": _conventions(scene),
+        "conventions.csv": _conventions(scene, others),
     }
     for name, rows in tables.items():
         with (folder / name).open("w", newline="", encoding="utf-8") as file:
             csv.writer(file, lineterminator="\n").writerows(rows)
-    others = [effect.name for effect in scene.effects if effect.on and effect.name not in (ROLLING, KINETIC)]
-    words = f"Effects that these tables cannot hold: {', '.join(others)}.\n" if others else ""
+    words = f"Effects that these tables cannot hold: {', '.join(one.name for one in others)}.\n" if others else ""
     text = README.format(title=scene.title, law=LAWS[scene.contact.law], effects=words)
     (folder / "README.txt").write_text(text, encoding="utf-8")
 
@@ -127,7 +131,9 @@ def _pairs(scene: Scene) -> Iterator[tuple[tuple[str, str], Pair]]:
         others: tuple[Body | str, ...] = (*scene.bodies[k:], scene.rig.wall)
         for other in others:
             name = other if isinstance(other, str) else other.name
-            yield (one.name, name), scene.contact_pair(one, other)
+            # Where several pairs would apply, the solver takes that of the later body's name.
+            pair = scene.contact_pair(one, other) if isinstance(other, str) else scene.contact_pair(other, one)
+            yield (one.name, name), pair
 
 
 def _bodies(scene: Scene) -> Rows:
@@ -148,7 +154,7 @@ CLUMP_RULES_MEAN = {
 }
 
 
-def _conventions(scene: Scene) -> Rows:
+def _conventions(scene: Scene, others: Sequence[Effect]) -> Rows:
     rolling, on = _rolling(scene)
     rows: Rows = [("quantity", "unit", "here", "in EDEM", "transfers")]
     rows += [
@@ -208,10 +214,9 @@ def _conventions(scene: Scene) -> Rows:
         ),
         ("mass, moments of inertia", "kg, kg m2", "of the true shape, principal axes", "set by hand", "yes"),
     ]
-    for effect in scene.effects:
-        if effect.on and effect.name not in (ROLLING, KINETIC):
-            numbers = ", ".join(f"{name} = {getattr(effect, name):g}" for name in effect.amplitudes)
-            rows.append((f"effect {effect.name}", "SI", numbers, "not in these tables", "no"))
+    for effect in others:
+        numbers = ", ".join(f"{name} = {getattr(effect, name):g}" for name in effect.amplitudes)
+        rows.append((f"effect {effect.name}", "SI", numbers, "not in these tables", "no"))
     return rows
 
 

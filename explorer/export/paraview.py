@@ -21,7 +21,7 @@ from explorer.errors import CommandError
 from explorer.export.target import ExportOrder, ExportTarget
 from explorer.outcomes import outcome_text
 from explorer.scene.meshes import GATE_NAME, Triangles, body_triangles, rig_triangles
-from solver import Bodies, Record, Scene, Spheres, value
+from solver import Bodies, Record, Scene, Spheres
 from solver.pours.contacts import Contacts, loads
 from solver.pours.record import Outcome
 from solver.pours.record_builder import member_spheres
@@ -78,10 +78,11 @@ def moments(scene: Scene, seed: int, every: float | None) -> tuple[tuple[PourSta
 
     With ``every`` None, only the last moment. Raises CommandError for more than ``MOST`` moments.
     """
-    if every is not None and value(scene, "numerics.max_time") > MOST * every:
-        raise CommandError(
-            f"--every {every:g}: more than {MOST} moments of a pour of up to {scene.numerics.max_time:g} s"
-        )
+    numerics = scene.numerics
+    longest = numerics.duration or numerics.max_time
+    # A moment comes with a sample of the curves, so never more often than those.
+    if every is not None and longest > MOST * max(every, numerics.sample_interval):
+        raise CommandError(f"--every {every:g}: more than {MOST} moments of a pour of up to {longest:g} s")
     # Imported here because it loads Taichi, which merely naming a target does not need.
     from solver import Job, run_queue
 

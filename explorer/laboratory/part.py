@@ -31,7 +31,10 @@ Table = dict[str, Any]
 SIZES = ("size_distribution", "size_spread")
 SCATTER = "log_normal"
 """Distribution of a measured spread, which has no effect without one; as for measured diameters in a material file."""
-ELASTIC = ("youngs_modulus", "shear_modulus", "poisson_ratio")
+MODULI = ("youngs_modulus", "shear_modulus")
+ELASTIC = (*MODULI, "poisson_ratio")
+IN_FORCE = 1e-6
+"""Relative difference up to which a modulus of the scene is the one that was measured."""
 STARTER = "the starter material"
 
 
@@ -106,7 +109,7 @@ def write_measured_material(folder: Path, name: str, like: str | None, parts: Se
     for part in parts:
         table = read_part(part)
         try:
-            scene = with_part(scene, table)
+            scene = with_part(scene, table, measured)
         except ParameterError as error:
             raise CommandError(f"{part}: does not fit {like or STARTER}: {error}") from None
         measured = merged(measured, table.get("measured", {}))
@@ -119,32 +122,44 @@ def _base(path: Path, like: str | None) -> tuple[Scene, dict[str, Any]]:
     """The scene to start from, and the ``measured`` tables of its file."""
     if like is None:
         return starter_scene(path), {}
-    return load_material(like), read_toml(asset_path("materials", like)).get("measured", {})
+    return load_material(like), measured_of(like)
 
 
-def measured_source(present: Scene, result: LabResult, folder: Path) -> SceneSource:
+def measured_of(material: str) -> Table:
+    """The tables ``[measured.…]`` of a material, by name or file."""
+    found: Table = read_toml(asset_path("materials", material)).get("measured", {})
+    return found
+
+
+def measured_source(present: Scene, result: LabResult, folder: Path, material: str = "") -> SceneSource:
     """``present`` with the parameters of ``result``, kept in ``folder`` as a file that also states their origins.
 
+    ``material``: the file or shipped material that ``present`` came from, whose origins are kept; empty: there is none.
     Raises CommandError if ``result`` has no parameter, and ParameterError if one does not fit the material.
     """
     part = part_table(result)
     if not set(part) - {"format", "measured"}:
         raise CommandError(f"{result.test}: the test gives no material parameter")
-    scene = with_part(present, part)
+    before = measured_of(material) if material else {}
+    scene = with_part(present, part, before)
     text = material_toml(scene, f"{present.title}, with {result.test} measured. SI; origins: [measured] below.")
-    text += measured_text(part.get("measured", {}))
+    text += measured_text(merged(before, part.get("measured", {})))
     path = kept_file(f"{present.title[:20]}-{result.test}.toml", text.encode(), folder, (".toml",))
     return material_source(str(path))
 
 
-def with_part(scene: Scene, table: Table) -> Scene:
-    """``scene`` with the parameters of a part, no longer marked as assumed. ParameterError if they do not fit."""
+def with_part(scene: Scene, table: Table, measured: Mapping[str, Any] | None = None) -> Scene:
+    """``scene`` with the parameters of a part, no longer marked as assumed. ParameterError if they do not fit.
+
+    ``measured``: tables ``[measured.…]`` of ``scene``; a modulus in them that is in force still holds beside another.
+    """
     part = checked(PartFile, table)
     settings: dict[str, Any] = {}
     struck: set[str] = set()
     for name, entry in part.materials.items():
-        settings |= _of_material(scene, name, entry)
-        struck |= {f"materials.{name}.{key}" for key in entry}
+        elastic = _measured_before(scene, name, entry, measured or {}) | entry
+        settings |= _of_material(scene, name, elastic)
+        struck |= {f"materials.{name}.{key}" for key in (*entry, *_determined(elastic))}
     for a, partners in part.pair.items():
         for b, entry in partners.items():
             for key, value in entry.items():
@@ -162,6 +177,27 @@ def with_part(scene: Scene, table: Table) -> Scene:
     struck |= set(of_bodies)
     scene = with_values(scene, settings)
     return dataclasses.replace(scene, assumed=tuple(path for path in scene.assumed if path not in struck))
+
+
+def _measured_before(scene: Scene, name: str, entry: Table, measured: Mapping[str, Any]) -> dict[str, float]:
+    """The modulus that was measured before the one elastic constant of ``entry``, and is in force; empty: none."""
+    given = [key for key in ELASTIC if key in entry]
+    if len(given) != 1:
+        return {}
+    kept, now = measured.get("materials", {}).get(name, {}), scene.material(name)
+    for key, in_force in zip(MODULI, (now.youngs_modulus, now.shear_modulus), strict=True):
+        before = kept[key].get("value") if isinstance(kept.get(key), dict) else None
+        if key not in given and isinstance(before, float) and math.isclose(before, in_force, rel_tol=IN_FORCE):
+            return {key: before}
+    return {}
+
+
+def _determined(entry: Table) -> tuple[str, ...]:
+    """Elastic constants that no longer rest on an assumption alone: two fix the third, and a modulus sets the other."""
+    given = [key for key in ELASTIC if key in entry]
+    if len(given) > 1:
+        return ELASTIC
+    return MODULI if set(given) & set(MODULI) else ()
 
 
 def _of_material(scene: Scene, name: str, entry: Table) -> dict[str, Any]:

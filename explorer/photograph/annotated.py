@@ -42,7 +42,10 @@ def sheet(
     simulated: SimulatedPiles | None,
     thirds: bool = False,
 ) -> Image.Image:
-    """All panels, one below the other; at most ``MOST_PANELS`` pictures. ``thirds``: with the lines of the thirds."""
+    """All panels, one below the other; at most the first ``MOST_PANELS`` pictures.
+
+    ``thirds``: with the lines of the thirds.
+    """
     panels = [_panel(*pair, thirds) for pair in zip(pictures, readings, strict=True)][:MOST_PANELS]
     if simulated is not None:
         piles = [reading for reading in readings if isinstance(reading, PhotographedPile)]

@@ -213,6 +213,8 @@ def keep_target(
         raise CommandError(f"{refusal.name}: no angle: {refusal.reason}: {refusal.detail}")
     old = _whole(folder) if anew else None
     before = None if anew else load_target(folder)
+    if before is not None and not all(_digest(pile.name) for pile in before.result.piles):
+        raise CommandError(f"{folder}: is a report of photographs, to which none is added; name another folder")
     result = photograph_result(measured, "", "")
     kept = list(before.result.piles) if before else []
     pictures: dict[str, bytes] = {}

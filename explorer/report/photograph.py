@@ -6,7 +6,7 @@ import io
 
 from PIL import Image
 
-from explorer.photograph.annotated import sheet
+from explorer.photograph.annotated import MOST_PANELS, sheet
 from explorer.photograph.result import MeasuredPhotographs, PhotographResult, ReadPile
 from explorer.photograph.run import MeasureOrder
 from explorer.report.content import (
@@ -58,9 +58,9 @@ def _png(picture: Image.Image) -> bytes:
 
 def photograph_report(result: PhotographResult, picture: bytes | None) -> Report:
     """The report; ``picture`` is the result of :func:`read_picture`, None if it is lost."""
-    names = ", ".join([*(pile.name for pile in result.piles), *result.refused])
     blocks: list[Block] = [_angles(result)] if result.piles else []
     if picture is not None:
+        names = ", ".join([*(pile.name for pile in result.piles), *result.refused][:MOST_PANELS])
         over = "the outline, both flank lines and the base line drawn over them: " if result.piles else "no angle: "
         blocks.append(
             Picture(
@@ -120,7 +120,9 @@ def _drawn(result: PhotographResult) -> str:
     """What the lines on the pictures mean."""
     if not result.piles:
         return "None was read, and nothing is drawn."
-    lines = "White: outline; orange: flank lines (least squares); green: their thirds; blue: base line."
+    n = len(result.piles) + len(result.refused)
+    lines = f"The first {MOST_PANELS} are drawn. " if n > MOST_PANELS else ""
+    lines += "White: outline; orange: flank lines (least squares); green: their thirds; blue: base line."
     return f"{lines} Lowest: the simulated pile {result.simulated}." if result.simulated else lines
 
 

@@ -23,7 +23,7 @@ PLAIN_EDGES = """{
         return get.call(this, kind, kind.startsWith("webgl") ? { ...how, antialias: false } : how);
     };
 }"""
-"""Drawn in software, a picture with smoothed edges takes twice as long (0.6 s at 916 × 1304 pixels instead of 0.3 s)."""
+"""Drawn in software, a picture of 916 × 1304 pixels takes 0.6 s with smoothed edges, and 0.3 s without."""
 
 
 def new_page(browser, width=1280, height=900, begun=True, **context):

@@ -10,7 +10,8 @@ import viser
 from doe.laboratory import TESTS
 from doe.laboratory.bias import BIASED
 from doe.table_file import SUFFIXES
-from explorer.laboratory.command_results import bench_result, examples_of, template_file, twin_result
+from explorer.background.command_output import kept_scene
+from explorer.laboratory.command_results import CommandResult, bench_result, examples_of, template_file, twin_result
 from explorer.laboratory.part import measured_source
 from explorer.laboratory.run import LabOrder, analysed
 from explorer.laboratory.twin_row import RIGS
@@ -115,15 +116,20 @@ class BenchPanel(Panel):
         if not (twin or bias):
             self._background.start("evaluating the readings", lambda: bench_result(order), self.view.show)
             return
-        material = self._session.source.material if twin else ""
-        asked = replace(order, simulate=twin, bias=bias, material=material or None)
-        self._background.start("running the test on the solver", lambda: twin_result(asked), self.view.show)
+        present, folder = self._session.status().scene, self._folder
+
+        def on_the_solver() -> CommandResult:
+            material = str(kept_scene(present, folder)) if twin else None
+            return twin_result(replace(order, simulate=twin, bias=bias, material=material))
+
+        self._background.start("running the test on the solver", on_the_solver, self.view.show)
 
     def _pour(self) -> None:
         order, present, folder = self._order(), self._session.status().scene, self._folder
+        material = self._session.source.material
         self._background.start(
             "making a material of the readings",
-            lambda: measured_source(present, analysed(order), folder),
+            lambda: measured_source(present, analysed(order), folder, material),
             self._start,
         )
 

@@ -2,10 +2,12 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from explorer.export.deck import pair_tables
 from explorer.export.liggghts import unclamped_restitution
 from explorer.export.material_table import write_material_table
 from explorer.scene.file import load_scene, with_settings
@@ -84,6 +86,30 @@ def test_effects_that_the_tables_cannot_hold_are_named(tmp_path):
     found = tables(tmp_path, ["effect.air_drag.strength=1"])
     assert found["conventions"][-1]["quantity"] == "effect air_drag"
     assert "air_drag" in (tmp_path / "README.txt").read_text()
+
+
+def test_effects_of_the_rig_are_named_though_they_are_carried_out(tmp_path):
+    tables(tmp_path, ["effect.plate_tilt.tilt_x=5", "effect.funnel_offset.dx=5mm", "effect.density_error.excess=0.1"])
+    assert "cannot hold: plate_tilt, funnel_offset." in (tmp_path / "README.txt").read_text()
+
+
+def test_of_several_pairs_that_would_apply_the_table_has_that_of_the_solver(tmp_path):
+    scene = load_scene("funnel")
+    names = ("seed", "plate")
+    materials = tuple(
+        replace(one, name=f"{one.name} stuff" if one.name in names else one.name) for one in scene.materials
+    )
+    bodies = tuple(replace(one, material=f"{one.name} stuff") if one.name in names else one for one in scene.bodies)
+    one, other = (body for body in bodies if body.name in names)
+    by_material = [(one.name, other.material, 0.5), (other.name, one.material, 0.3)]
+    pairs = tuple(replace(scene.pairs[0], a=a, b=b, static_friction=friction) for a, b, friction in by_material)
+    kept = tuple(pair for pair in scene.pairs if not pair.joins(one.name, other.name))
+    scene = replace(scene, materials=materials, bodies=bodies, pairs=(*pairs, *kept))
+    write_material_table(tmp_path, scene)
+    with (tmp_path / "interactions.csv").open(newline="", encoding="utf-8") as file:
+        rows = {(row["a"], row["b"]): row for row in csv.DictReader(file)}
+    friction = pair_tables(scene)[0]
+    assert float(rows[one.name, other.name]["static_friction"]) == pytest.approx(friction[0, 1]) == 0.3
 
 
 def test_effects_of_the_set_up_are_carried_out(tmp_path):

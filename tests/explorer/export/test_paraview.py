@@ -63,8 +63,14 @@ def test_only_the_end_without_every(taichi, scene):
 
 
 def test_too_many_moments_are_refused(scene):
-    with pytest.raises(CommandError, match="--every 1e-05: more than 2000 moments"):
-        moments(scene, 5, 1e-5)
+    with pytest.raises(CommandError, match=r"--every 0\.001: more than 2000 moments"):
+        moments(with_settings(scene, ["numerics.sample_interval=1ms", "numerics.max_time=8s"]), 5, 1e-3)
+
+
+def test_a_duration_ends_the_moments(taichi, scene):
+    short = with_settings(scene, ["numerics.max_time=8s", "numerics.duration=0.03s", "insertion.rate=1kg/s"])
+    seen, _ = moments(short, 5, 0.003)
+    assert 2 < len(seen) < 6
 
 
 def test_shapes_have_the_volume_of_their_bodies(poured, scene):

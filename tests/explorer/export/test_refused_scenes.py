@@ -14,7 +14,7 @@ from solver import with_values
 from solver.effects import EFFECTS
 from solver.scenes.contact_model import ContactModel
 from solver.scenes.sizes import SizeDistribution
-from tests.explorer.command_line import explorer, refused
+from tests.explorer.command_line import TINY, explorer, refused, settings
 from tests.solver.observables.made_up import cone, record_of
 
 
@@ -106,6 +106,24 @@ def test_a_time_beyond_the_end_of_the_pour_is_refused_where_nothing_simulates_on
     assert line == f"--time 100: the pour for --to paraview lasts {longest} s at most; allowed: up to that"
     assert not (tmp_path / "new").exists()
     assert [name for name, one in EXPORTS.items() if one.goes_on] == ["liggghts", "yade"]
+
+
+def test_a_characteristic_velocity_that_liggghts_refuses_is_refused_before_the_pour():
+    slow = {"contact.law": "linear_spring_dashpot", "contact.characteristic_velocity": 0.005}
+    with pytest.raises(CommandError, match=r"characteristic_velocity: 0\.005 m/s; allowed by LIGGGHTS: from 0\.01 on"):
+        EXPORTS["liggghts"].check(with_values(load_scene("funnel"), slow))
+    EXPORTS["liggghts"].check(with_values(load_scene("funnel"), slow | {"contact.characteristic_velocity": 0.01}))
+
+
+@pytest.mark.parametrize(("to", "duration"), [("yade", 0.0), ("paraview", 0.05)])
+def test_a_time_and_a_duration_of_the_file_go_together(to, duration, tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(EXPORTS[to], "write", lambda folder, order: asked.append(order) or "done")
+    line = ("export", "funnel", tmp_path / "new", "--to", to, "--time", 0.1, "--set", "numerics.duration=0.15s")
+    result = explorer(*line, *settings({**TINY, "numerics.max_time": "0.2s", "insertion.rate": "1kg/s"}))
+    assert result.exit_code == 0, result.output
+    numerics = asked[0].scene.numerics
+    assert (numerics.max_time, numerics.duration) == (0.1, 0.1 if duration else 0.0)
 
 
 @pytest.mark.parametrize("time", ["0.05", "inf", "nan"])

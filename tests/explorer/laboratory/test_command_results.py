@@ -2,6 +2,7 @@
 
 import re
 import shlex
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from explorer.laboratory.part import measured_source, read_part
 from explorer.laboratory.run import LabOrder, analysed
 from solver import ParameterError, load_material, value
 from solver.assets import asset_path, shipped_assets
+from solver.toml_file import read_toml
 from tests.explorer.command_line import explorer
 from tests.solver.photograph.examples import BAR_MM, EXAMPLES, MM_PER_PX
 
@@ -187,6 +189,15 @@ def test_a_pour_gets_what_was_measured_in_a_file_that_says_where_it_is_from(tmp_
     assert load_material(str(file)) == source.scene
     assert "[measured.pair.seed.seed.static_friction]" in file.read_text()
     assert value(source.scene, "pair.seed.seed.restitution") == value(present, "pair.seed.seed.restitution")
+
+
+def test_a_second_bench_test_keeps_the_origins_of_the_first(tmp_path):
+    first = measured_source(
+        load_material("sunflower_extract"), analysed(LabOrder("inclined_plane", "inclined_plane")), tmp_path
+    )
+    second = measured_source(first.scene, analysed(LabOrder("drop", "drop")), tmp_path, first.material)
+    measured = read_toml(Path(second.material))["measured"]["pair"]["seed"]["plate"]
+    assert {"static_friction", "restitution"} <= set(measured)
 
 
 def test_readings_without_a_parameter_or_of_another_material_pour_nothing(tmp_path):

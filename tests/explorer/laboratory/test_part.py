@@ -1,5 +1,6 @@
 """Parts of a material: what `explorer lab --out` writes, and how it gets into a material."""
 
+import dataclasses
 import hashlib
 import math
 import tomllib
@@ -8,7 +9,15 @@ import pytest
 
 from doe.laboratory import analyse
 from doe.laboratory.analysis import analyse_composition, analyse_elastic
-from explorer.laboratory.part import measured_text, merged, part_table, part_text, read_part, with_part
+from explorer.laboratory.part import (
+    measured_text,
+    merged,
+    part_table,
+    part_text,
+    read_part,
+    with_part,
+    write_measured_material,
+)
 from solver import ParameterError, load_material, value
 from solver.assets import asset_path
 
@@ -97,6 +106,49 @@ def test_friction_and_restitution_get_into_the_material_in_either_order(scene):
 def test_what_is_measured_of_elasticity_fixes_the_rest(entry, shear, ratio, scene):
     seed = with_part(scene, {"format": 1, "materials": {"seed": entry}}).material("seed")
     assert (seed.shear_modulus, seed.poisson_ratio) == pytest.approx((shear, ratio))
+
+
+def kept(folder, name, entry):
+    """A part with elastic constants of the seed [Pa], with their origin."""
+    path = folder / name
+    origins = {key: {"value": value, "source": name} for key, value in entry.items()}
+    tables = {"format": 1, "materials": {"seed": entry}, "measured": {"materials": {"seed": origins}}}
+    path.write_text(part_text(tables, name))
+    return path
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_moduli_of_two_tests_hold_together_in_either_order(order, tmp_path):
+    parts = [kept(tmp_path, "e.toml", {"youngs_modulus": 1.2e8}), kept(tmp_path, "g.toml", {"shear_modulus": 5e7})]
+    file = write_measured_material(tmp_path, "own", "sunflower_extract", [parts[k] for k in order])
+    seed = load_material(str(file)).material("seed")
+    assert (seed.shear_modulus, seed.poisson_ratio) == pytest.approx((5e7, 0.2))
+    # One after the other, over the file of the first.
+    first = write_measured_material(tmp_path, "first", "sunflower_extract", [parts[order[0]]])
+    then = load_material(str(write_measured_material(tmp_path, "then", str(first), [parts[order[1]]])))
+    assert then.material("seed") == seed
+
+
+def test_a_measured_modulus_that_was_changed_since_is_not_brought_back(scene):
+    measured = {"materials": {"seed": {"shear_modulus": {"value": 4.5e7}}}}
+    seed = with_part(scene, {"format": 1, "materials": {"seed": {"youngs_modulus": 1.31e8}}}, measured)
+    assert seed.material("seed").poisson_ratio == scene.material("seed").poisson_ratio
+
+
+@pytest.mark.parametrize(
+    ("entry", "left"),
+    [
+        ({"youngs_modulus": 1.2e8}, {"poisson_ratio"}),
+        ({"shear_modulus": 5e7}, {"poisson_ratio"}),
+        ({"youngs_modulus": 1.2e8, "shear_modulus": 5e7}, set()),
+        ({"poisson_ratio": 0.2}, {"youngs_modulus", "shear_modulus"}),
+    ],
+)
+def test_what_a_measured_modulus_fixes_is_no_longer_assumed(entry, left, scene):
+    names = ("youngs_modulus", "shear_modulus", "poisson_ratio")
+    assumed = dataclasses.replace(scene, assumed=tuple(f"materials.seed.{name}" for name in names))
+    found = with_part(assumed, {"format": 1, "materials": {"seed": entry}})
+    assert {path.rpartition(".")[2] for path in found.assumed} == left
 
 
 def test_composition_replaces_all_fractions_at_once_and_they_are_no_longer_assumed(scene):

@@ -242,6 +242,9 @@ def test_measure_keeps_a_target_that_grows(piles, blank, tmp_path):
 def test_a_report_of_photographs_is_a_target_as_well(piles, tmp_path):
     assert explorer("measure", *piles, "--scale", MM, "--report", tmp_path / "report").exit_code == 0
     assert load_target(tmp_path / "report").n == 3
+    line = refused(explorer("measure", piles[0], "--scale", MM, "--target", tmp_path / "report"))
+    assert "is a report of photographs" in line
+    assert load_target(tmp_path / "report").n == 3
 
 
 def test_calibrate_refuses_a_folder_without_photographs(tmp_path):

@@ -11,6 +11,7 @@ import numpy as np
 import openpyxl
 import pytest
 
+import solver
 from doe.designs import DESIGNS
 from doe.laboratory import TESTS
 from doe.laboratory.analysis import template_of
@@ -32,6 +33,7 @@ from explorer.viewer.laboratory.photograph_panel import NO_BOARD, PhotographPane
 from explorer.viewer.laboratory.rig_panel import RigPanel
 from explorer.viewer.panel import Now
 from explorer.viewer.study.reports_panel import NONE, ReportsPanel
+from solver import load_material, with_values
 from solver.assets import asset_path
 from tests.explorer.command_line import explorer
 from tests.explorer.measured.test_balance import BEGINS, MASS, steady, write
@@ -398,21 +400,22 @@ def test_a_rig_is_run_with_what_is_on_the_screen(room, monkeypatch):
     assert "0.62 for 0.62" in rig.text
 
 
-def test_a_bench_test_is_repeated_on_the_solver_with_the_material_that_is_poured(bench, monkeypatch):
+def test_a_bench_test_is_repeated_on_the_solver_with_the_material_that_is_poured(room, bench, monkeypatch):
     asked = []
     monkeypatch.setattr(
         "explorer.viewer.laboratory.bench_panel.twin_result", lambda order: asked.append(order) or CommandResult("", "")
     )
+    now, restitution = room.session.now, "pair.seed.seed.restitution"
+    room.session.now = replace(now, scene=with_values(now.scene, {restitution: 0.31}))
     bench.enter("Test", "drop")
     bench.enter("Repeat it on the solver", True)
     assert bench.press("Evaluate") == ""
     bench.enter("Repeat it on the solver", False)
     bench.enter("Where the formula misses", True)
     assert bench.press("Evaluate") == ""
-    assert [(one.simulate, one.bias, one.material) for one in asked] == [
-        (True, False, "sunflower_extract"),
-        (False, True, None),
-    ]
+    assert [(one.simulate, one.bias) for one in asked] == [(True, False), (False, True)]
+    assert solver.value(load_material(asked[0].material), restitution) == 0.31
+    assert asked[1].material is None
 
 
 def test_a_photograph_is_compared_with_what_is_poured(room, photograph, monkeypatch):
