@@ -170,10 +170,7 @@ class _Entry:
         of_a_pour = float(data.deviation_of_a_pour(condition.after)[column])
         deviation = math.sqrt(data.share * of_a_pour**2 + instrument**2)
         noise = deviation**2 if data.alone else _square_error(measured)
-        draws = [
-            values[generator.integers(0, len(values), size=(samples, len(values)))].mean(axis=1)
-            for values in (measured, before, after)
-        ]
+        draws = [_drawn_means(values, samples, generator) for values in (measured, before, after)]
         if data.alone:
             draws[0] = draws[0] + deviation * generator.standard_normal(samples)
         return _Entry(
@@ -275,6 +272,16 @@ def held_out(
 def _skill(before: float, after: float) -> float:
     """Return 1 - after/before of squared errors less their noise; NaN where nothing but noise is left in `before`."""
     return 1 - after / before if before > 0 else math.nan
+
+
+def _drawn_means(values: FloatArray, samples: int, generator: np.random.Generator) -> FloatArray:
+    """Bootstrap means (samples,); their variance is s²/n, with s² over n − 1 (Efron 1982, doi 10.1137/1.9781611970319).
+
+    Means of plain resamples have the variance (n − 1)/n s²/n, less than the noise floor that is subtracted from them.
+    """
+    n = len(values)
+    means = values[generator.integers(0, n, size=(samples, n))].mean(axis=1)
+    return np.asarray(values.mean() + (means - values.mean()) * math.sqrt(n / max(1, n - 1)))
 
 
 def _square_error(values: FloatArray) -> float:

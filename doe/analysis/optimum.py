@@ -236,6 +236,8 @@ def find_compromise(models: Sequence[Surface], targets: Sequence[Target], refere
     statement = f"The targets are missed by at most {abs(missed[worst]):.1f} standard errors (target {worst + 1})."
     if abs(missed[worst]) > 2.0:
         statement += " They contradict each other within this model and region."
+    if np.ptp(weight) > 0.0:
+        statement += " The weights move this setting, not the 95 % intervals."
     predicted = missed * spread + goal
     margin = np.array([t.margin for t in targets])
     return Compromise(

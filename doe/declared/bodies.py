@@ -250,19 +250,27 @@ def wanted_bodies(measurement: Measurement, declared: Declared, answers: Sequenc
 def _evidence(measurement: Measurement, declared: Declared, rows: Sequence[MeasuredBody]) -> BodyEvidence:
     scene = measurement.fit[0].scene
     errors = np.array([one.deviation for one in rows])
-    sides = [
-        with_values(scene, {p.name: p.within(p.middle + side * p.deviation)})
-        for p in declared.parameters
-        for side in (-1.0, 1.0)
-    ]
+    levels = [(p, p.within(p.middle - p.deviation), p.within(p.middle + p.deviation)) for p in declared.parameters]
+    sides = [with_values(scene, {p.name: level}) for p, *both in levels for level in both]
     still, *moved = body_numbers([scene, *sides], rows)
-    both = (np.array(moved).reshape(-1, 2, len(rows)) - still) / errors
-    slopes, bends = 0.5 * (both[:, 1] - both[:, 0]).T, 0.5 * (both[:, 1] + both[:, 0]).T
+    shifts = (np.array(moved).reshape(-1, 2, len(rows)) - still) / errors
+    slopes, bends = (np.zeros((len(rows), len(levels))) for _ in range(2))
+    for k, ((p, low, high), (below, above)) in enumerate(zip(levels, shifts, strict=True)):
+        slopes[:, k], bends[:, k] = _parabola(
+            (p.middle - low) / p.deviation, below, (high - p.middle) / p.deviation, above
+        )
     # The line misses κ θ² of y = K θ + κ θ², whose mean square is Σᵢⱼ κᵢ κⱼᵀ + 2 Σᵢ κᵢ κᵢᵀ.
     noise = np.eye(len(rows)) + np.outer(bends.sum(axis=1), bends.sum(axis=1)) + 2.0 * bends @ bends.T
-    factor = np.linalg.cholesky(noise + slopes @ slopes.T)
+    factor = np.asarray(np.linalg.cholesky(noise + slopes @ slopes.T), dtype=np.float64)
     off = solve_triangular(factor, (np.array([one.value for one in rows]) - still) / errors, lower=True)
     return BodyEvidence(scene, tuple(rows), off, slopes, noise, factor, declared.effects)
+
+
+def _parabola(a: float, below: FloatArray, b: float, above: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """K and κ of y = K θ + κ θ² through y(−a) = ``below`` and y(b) = ``above``; a line where a side is cut off."""
+    if min(a, b) <= 0.0:
+        return (above / b if b > 0.0 else -below / a), np.zeros_like(below)
+    return (above * a**2 - below * b**2) / (a * b * (a + b)), (above * a + below * b) / (a * b * (a + b))
 
 
 @dataclass(frozen=True)

@@ -117,7 +117,8 @@ def ascent(
     """
     by_name = {factor.name: factor for factor in study.factors}
     factors = tuple(by_name[chosen.name] for chosen in screened.selected)
-    models = [_first_order(screened, factors, target, noise[target.observable]) for target in study.targets]
+    held = tuple(factor for factor in study.factors if factor not in factors)
+    models = [_first_order(screened, factors, held, target, noise[target.observable]) for target in study.targets]
     path = _path(factors, models, profile.ascent_steps)
     settings = [
         Setting(
@@ -162,14 +163,20 @@ def ascent(
     )
 
 
-def _first_order(screened: ScreeningResult, factors: Sequence[Factor], target: Target, noise: Noise) -> FirstOrder:
-    """The screening's model of ``target`` over ``factors``."""
+def _first_order(
+    screened: ScreeningResult, factors: Sequence[Factor], held: Sequence[Factor], target: Target, noise: Noise
+) -> FirstOrder:
+    """The screening's model of ``target`` over ``factors``; ``held``: the others, which the walk keeps at reference."""
     found = screened.further_analyses.get(target.observable, screened.target_analysis)
     effects = {effect.name: effect.effect for effect in found.effects}
-    spread = math.hypot(target.standard_error, noise.sigma / math.sqrt(found.runs))
+    # The screening's mean is that at the middle of every range; half an effect is as uncertain as the mean.
+    known = [one for one in held if math.isfinite(effects.get(one.name, math.nan))]
+    away = np.array([one.coded(one.reference) for one in known])
+    mean = found.mean + float(away @ np.array([effects[one.name] / 2.0 for one in known]))
+    spread = math.hypot(target.standard_error, noise.sigma * math.sqrt((1.0 + float(away @ away)) / found.runs))
     least = max(LEAST_SPREAD * max(abs(target.mean), abs(found.mean)), sys.float_info.min)
     return FirstOrder(
-        mean=found.mean,
+        mean=mean,
         effects=np.array([effects[factor.name] for factor in factors]),
         goal=target.mean,
         spread=max(spread, least),

@@ -37,6 +37,6 @@ class Profile(Record):
     verification_runs: Annotated[int, Whole(3)] = 12
     resolution_deg: Annotated[float, Number(above=0.0)] | None = None
     """Difference that the replicates, sized by the pilot, have to resolve."""
-    max_replicates: Annotated[int, Whole(1)] = 12
+    max_replicates: Annotated[int, Whole(2)] = 12
     reach_runs: Annotated[int, Whole(0)] = 3
     """Pours at each corner of the factors, to see whether the target can be reached; 0: none."""

@@ -171,6 +171,12 @@ class Factor(Record):
             return self.high if coded > 0 else self.low
         return self.low + 0.5 * (coded + 1.0) * (self.high - self.low)
 
+    def coded(self, value: float | str) -> float:
+        """Return the coded level of a value, the inverse of :meth:`level`."""
+        if isinstance(self.low, str) or isinstance(self.high, str) or isinstance(value, str):
+            return 1.0 if value == self.high else -1.0
+        return 2.0 * (value - self.low) / (self.high - self.low) - 1.0
+
 
 @dataclass(frozen=True)
 class Study:
@@ -346,9 +352,12 @@ def _refuse_without_error(study: Study, profile: Profile) -> None:
         len(study.surface_design.points(CALIBRATED).coded),
         len(term_names([str(k) for k in range(CALIBRATED)])),
     )
-    if rows * profile.surface_replicates <= terms:
+    sized = profile.resolution_deg is not None  # then the pilot decides, up to the limit
+    key = "max_replicates" if sized else "surface_replicates"
+    replicates = profile.max_replicates if sized else profile.surface_replicates
+    if rows * replicates <= terms:
         raise ParameterError(
-            f"{study.file}: profile.{profile.name}.surface_replicates: {profile.surface_replicates} of {rows} points "
+            f"{study.file}: profile.{profile.name}.{key}: {replicates} of {rows} points "
             f"leave no error for the {terms} terms of the surface; allowed: at least {terms // rows + 1}"
         )
 
@@ -372,6 +381,8 @@ def study_from(table: Settings, path: Path) -> Study:
         _require_room(together, [body.name for body in scene.bodies])
     scene = with_values(scene, {one.path: one.reference for one in (*factors, *assumptions)})
     beside = main_effect_design(file.assumptions, "assumptions", "assumption", ASSUMPTIONS, assumptions, None)
+    _require_rows(scene, factors, screening, "screening")
+    _require_rows(scene, assumptions, beside, "assumptions")
     for name in file.fallback:
         one_of(name, "fallback", [factor.name for factor in factors])
     if len(file.fallback) < CALIBRATED:
@@ -508,6 +519,18 @@ def _require_room(factors: Sequence[Factor], bodies: list[str]) -> None:
             f"factor.path: mass fractions of {', '.join(high)}, up to {sum(high.values()):g} together; allowed: up to "
             "1, with at least one component left to take the rest"
         )
+
+
+def _require_rows(scene: Scene, factors: Sequence[Factor], chosen: ChosenDesign, key: str) -> None:
+    """Refuse levels that are possible one by one, but not together in a row of the design."""
+    if not factors:
+        return
+    for number, row in enumerate(chosen.points(len(factors)).coded, start=1):
+        values = {one.path: one.level(float(coded)) for one, coded in zip(factors, row, strict=True)}
+        try:
+            with_values(scene, values)
+        except ParameterError as error:
+            raise StudyFileError(f"{key}: row {number} of the design is impossible: {error}") from None
 
 
 def _scan(scene: Scene, scan: ScanTable | None) -> tuple[str | None, tuple[float, ...]]:

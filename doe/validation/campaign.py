@@ -83,7 +83,8 @@ class CampaignOrder:
 
     def asked(self, laboratory: Laboratory) -> tuple[Case, ...]:
         """The cases of this shard, or those of them that are asked for."""
-        kinds = possible_outside(laboratory.declared.scene, development=self.wide)
+        scenes = [condition.scene for condition in laboratory.declared.conditions]
+        kinds = possible_outside(scenes, development=self.wide)
         found = self.cases or tuple(cases(self.root, self.number, kinds, self.wide))
         return tuple(case for case in found[self.shard - 1 :: self.of] if not self.only or case.number in self.only)
 
@@ -220,10 +221,10 @@ class Answers:
         verdict = verdict_of(compared, declared, training.pours, follow_ups)
         conclusion, verdict = concluded(verdict, compared, declared, measurement.holdout, held, say)
         found = compared.posterior
-        suggestion = None
+        suggestion, more = None, 0
         if self.follow_up and not follow_ups:
             candidates = suggested(verdict, found, training, measurement, self.model_pours)
-            suggestion = next(iter(candidates.suggestions), None)
+            suggestion, more = next(iter(candidates.suggestions), None), candidates.run_now
         best, best_p = found.best
         label = label_of(truth)
         true, named = frozenset(label.split("+")), {frozenset(name.split("+")) for name in verdict.names}
@@ -257,7 +258,7 @@ class Answers:
             after=after,
             bias_before=bias_before,
             bias_after=bias_after,
-            pours=fitted.run_now + held.run_now,
+            pours=fitted.run_now + held.run_now + more,
             physics=PHYSICS,
         )
         return Judged(row, suggestion)

@@ -6,7 +6,7 @@ Some are for development; a test (``truth.py``) uses all. Each pour is stepped b
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,10 +66,12 @@ class OutsideEffect:
         return (outlet or not self.needs_outlet) and (clump or not self.needs_clump)
 
 
-def possible_outside(scene: Scene, development: bool = False) -> tuple[str, ...]:
-    """Names of the outside effects that can act in ``scene``; ``development``: only those for development."""
+def possible_outside(scenes: Sequence[Scene], development: bool = False) -> tuple[str, ...]:
+    """Names of the outside effects that can act in all of ``scenes``; ``development``: only those for development."""
     return tuple(
-        one.name for one in OUTSIDE_EFFECTS.values() if one.possible(scene) and (one.development or not development)
+        one.name
+        for one in OUTSIDE_EFFECTS.values()
+        if all(map(one.possible, scenes)) and (one.development or not development)
     )
 
 

@@ -177,7 +177,8 @@ def extended(found: Reference, declared: Declared, pours: ModelPours) -> Referen
             known = found.sample.pours[kind][c : c + 1] if kind in found.sample.pours else ()
             # Kept in single precision, so that a reference is the same whether it was made at once or in pieces.
             shape = len(complete), len(found.features[c])
-            blocks.append(np.concatenate([*known, np.array(complete, dtype=np.float32).reshape(shape)]))
+            rounded = np.array(complete, dtype=np.float32).astype(np.float64).reshape(shape)
+            blocks.append(np.concatenate([*known, rounded]))
         sample[kind] = tuple(blocks)
     parameters = tuple(parameter.name for parameter in declared.parameters)
     return replace(found, rounds=found.rounds + 1, sample=ReferencePours(sample, parameters))

@@ -3,7 +3,7 @@
 A line is appended when its data set is judged. Its answer is one of
 
 right        the effect's name, or both names of a pair
-undecided    ambiguous, with the truth among the names
+undecided    ambiguous, with the truth among what it leaves
 wrong        another name, ambiguous without the truth, or only one name of a pair
 unexplained  more than noise, but no name
 nothing      no missing effect
@@ -34,6 +34,8 @@ Answer = Literal["right", "undecided", "wrong", "unexplained", "nothing", "out o
 
 OUT_OF_REACH = "out of reach: "
 """Start of the verdict on an impossible truth, followed by the reason."""
+TRUE_ANSWERS = {"null": "no_missing_effect", "outside": "unexplained"}
+"""The true answer to data sets in which no effect of the library acts, by their kind."""
 NONE = "none"
 """Label of a data set in which nothing is missing."""
 LEVEL = 0.95
@@ -126,12 +128,12 @@ class SetRow(Record):
     @property
     def answer(self) -> Answer:
         """The score of the verdict."""
-        return answer_to(self.verdict, self.label)
+        return answer_to(self.verdict, self.kind, self.label)
 
     @property
     def first_answer(self) -> Answer:
         """The score of the verdict before the follow-up."""
-        return answer_to(self.first or self.verdict, self.label)
+        return answer_to(self.first or self.verdict, self.kind, self.label)
 
     @property
     def named(self) -> bool:
@@ -251,21 +253,20 @@ class Tempered:
     false: Rate
 
 
-def answer_to(verdict: str, label: str) -> Answer:
-    """The score of ``verdict`` if ``label`` is true, as listed at the top of this module."""
+def answer_to(verdict: str, kind: str, label: str) -> Answer:
+    """The score of ``verdict`` on a truth of ``kind`` with ``label``, as listed at the top of this module."""
     if verdict.startswith(OUT_OF_REACH):
         return "out of reach"
-    kind, _, rest = verdict.partition(":")
-    if kind == "no_missing_effect":
+    said, _, rest = verdict.partition(":")
+    if said == "no_missing_effect":
         return "nothing"
-    if kind == "unexplained":
+    if said == "unexplained":
         return "unexplained"
     names = {frozenset(name.split("+")) for name in rest.split(",")}
-    truth = frozenset(label.split("+"))
-    if kind in ("effect", "effects"):
+    truth = frozenset([TRUE_ANSWERS[kind]] if kind in TRUE_ANSWERS else label.split("+"))
+    if said in ("effect", "effects"):
         return "right" if names == {truth} else "wrong"
-    left = {NONE: "no_missing_effect"}.get(label)
-    return "undecided" if truth in names or left in rest.split(",") else "wrong"
+    return "undecided" if truth in names else "wrong"
 
 
 def read_rows(path: Path) -> list[SetRow]:

@@ -105,10 +105,11 @@ class Strengths:
         return None
 
     def _power(self, effect: str, one: Reached) -> float:
-        measured = next((r for r in (one, *self.reached[effect]) if r.weak is not None and r.weak.value > 0.0), None)
-        if measured is None or measured.weak is None:
-            return 1.0
-        return float(np.clip(math.log2(measured.ruler.value / measured.weak.value), *POWERS))
+        for measured in (one, *self.reached[effect]):
+            strong, weak = measured.ruler, measured.weak
+            if weak is not None and weak.value > 0.0 and strong.value > SEEN * strong.error:
+                return float(np.clip(math.log2(strong.value / weak.value), *POWERS))
+        return 1.0
 
 
 def cases(root: int, number: int, outside: Sequence[str], wide: bool = False) -> Iterator[Case]:

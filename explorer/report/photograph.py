@@ -58,15 +58,15 @@ def _png(picture: Image.Image) -> bytes:
 
 def photograph_report(result: PhotographResult, picture: bytes | None) -> Report:
     """The report; ``picture`` is the result of :func:`read_picture`, None if it is lost."""
+    names = [*(pile.name for pile in result.piles), *result.refused]
     blocks: list[Block] = [_angles(result)] if result.piles else []
     if picture is not None:
-        names = ", ".join([*(pile.name for pile in result.piles), *result.refused][:MOST_PANELS])
         over = "the outline, both flank lines and the base line drawn over them: " if result.piles else "no angle: "
         blocks.append(
             Picture(
                 READ,
                 picture,
-                f"Photographs of piles with {over}{names}",
+                f"Photographs of piles with {over}{', '.join(names[:MOST_PANELS])}",
                 f"{_counted(result)} {_drawn(result)}".strip(),
             )
         )
@@ -102,7 +102,7 @@ def photograph_report(result: PhotographResult, picture: bytes | None) -> Report
     )
     return Report(
         "Angle of repose on photographs",
-        names,
+        ", ".join(names),
         banner(result),
         (*sections, methods),
         result.about,

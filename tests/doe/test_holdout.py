@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from doe.errors import StatisticsError
-from doe.holdout import OVERALL, HoldoutCondition, MeasuredReplicates, holdout_errors
+from doe.holdout import OVERALL, HoldoutCondition, MeasuredReplicates, _drawn_means, holdout_errors
 
 
 def compared(names, measured, before, after, stated=0.0, mean_of=1):
@@ -139,6 +139,15 @@ def test_the_interval_of_the_skill_is_that_of_the_resamples():
         # b² is resampled to 2 %; 20 000 draws leave 0.08 of the 97.5 % quantile of 5.02.
         for skill, share in ((row.skill_low, 0.975), (row.skill_high, 0.025)):
             assert (1.0 - skill) * b**2 == pytest.approx(stats.chi2.ppf(share, 1) - 2.0, abs=0.35)
+
+
+def test_the_resamples_scatter_as_the_means_do():
+    """Means of plain resamples of n = 3 scatter by (n − 1)/n of the floor that is subtracted from them: 8 < 12."""
+    values = np.array([0.0, 6.0, 6.0])
+    means = _drawn_means(values, 200_000, np.random.default_rng(0))
+    # The variance of 200 000 means is good to 1 %.
+    assert means.var() == pytest.approx(values.var(ddof=1) / 3.0, rel=0.01)
+    assert means.mean() == pytest.approx(values.mean(), abs=0.02)
 
 
 @pytest.mark.parametrize(("inside", "outside"), [(10.9, 11.0), (-10.9, -11.0)])

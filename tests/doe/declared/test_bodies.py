@@ -91,6 +91,14 @@ def test_what_is_calibrated_is_known_as_well_as_the_parameter(data):
     assert evidence_of(data) is None
 
 
+@pytest.mark.parametrize("ends", [(2000.0, 2550.0), (2000.0, 2500.0), (2450.0, 3000.0)])
+def test_a_range_that_cuts_a_side_off_leaves_the_slope(data, ends):
+    """ln m of a density ± 10 % rises by 0.1 per deviation, though the range ends 0.2 or 0 deviations from the mean."""
+    density = MeasuredParameter("material.glass.density", *ends, 2500.0, 250.0, "kg/m3")
+    found = evidence_of(replace(data, parameters=(density,)), MeasuredBody("bead", "mass", MASS, 0.01 * MASS))
+    assert found.slopes == pytest.approx(np.array([[0.1 / 0.01]]), rel=0.06)  # a line alone misses the curvature, 5 %
+
+
 def test_two_frictions_share_what_is_not_known_of_the_declared_one(data):
     """Both are 20 % too high, ± 5 % each: with a declared friction that is known to 10 %, hardly more than one is."""
     friction = MeasuredParameter("pair.glass.steel.static_friction", 0.2, 0.4, 0.3, 0.03, "1")

@@ -48,10 +48,15 @@ def test_the_centre_of_a_screening_is_known_by_all_of_its_runs():
     design, names = plackett_burman(12)[:, :5], tuple("ABCDE")
     values = 20 + design @ [2.0, 0, -1, 0, 0] + np.array([[0.1], [-0.1]])
     screened = SimpleNamespace(target_analysis=analyse_screening(design, names, values.T, ()), further_analyses={})
-    model = _first_order(screened, [SimpleNamespace(name=name) for name in "CA"], TARGET, NOISE)
+    model = _first_order(screened, [SimpleNamespace(name=name) for name in "CA"], [], TARGET, NOISE)
     assert (model.mean, model.goal, model.weight) == (pytest.approx(20.0), 25.0, 1.0)
     assert model.effects == pytest.approx([-2.0, 4.0])
     assert model.spread == pytest.approx(math.hypot(1.2 / 3, 1.5 / math.sqrt(24)))
+    # A at 0.5 of its way up, and as uncertain as that.
+    held = SimpleNamespace(name="A", reference=0.6, coded={0.6: 0.5}.get)
+    model = _first_order(screened, [SimpleNamespace(name="C")], [held], TARGET, NOISE)
+    assert model.mean == pytest.approx(20.0 + 0.5 * 2.0)
+    assert model.spread == pytest.approx(math.hypot(1.2 / 3, 1.5 * math.sqrt((1.0 + 0.25) / 24)))
 
 
 def test_two_steps_that_differ_so_much_are_told_apart_by_80_percent():

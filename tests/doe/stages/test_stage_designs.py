@@ -145,6 +145,25 @@ def test_a_surface_without_a_run_for_the_error_is_refused_before_anything_is_pou
     assert with_profile(two, "two")[1].surface_replicates == 2
 
 
+def test_with_a_resolution_the_most_replicates_decide_whether_a_surface_has_an_error():
+    study = study_with(surface={"design": "sobol", "runs": 10})
+    sized = Profile("sized", surface_replicates=1, resolution_deg=1.0, max_replicates=12)
+    assert with_profile(dataclasses.replace(study, profiles={"sized": sized}), "sized")
+    with pytest.raises(ParameterError, match=r"profile\.sized\.max_replicates: 1 is not a whole number of at least 2"):
+        study_with(profile={"sized": {"resolution_deg": 1.0, "max_replicates": 1}})
+
+
+def test_levels_that_are_impossible_together_are_refused_before_anything_is_poured():
+    table = copy.deepcopy(TABLE)
+    ends = {"rig.outlet_diameter": (0.03, 0.11, 0.03), "rig.inlet_diameter": (0.1, 0.2, 0.114)}
+    table["assumption"] = [
+        {"name": path, "path": path, "low": low, "high": high, "reference": reference}
+        for path, (low, high, reference) in ends.items()
+    ]
+    with pytest.raises(StudyFileError, match=r"assumptions: row \d+ of the design is impossible: rig\..*diameter"):
+        study_from(table, PATH)
+
+
 def test_efficiency_is_one_for_orthogonal_two_level_designs_and_the_share_of_moved_rows_otherwise():
     factors = len(TABLE["factor"])
     of = {
@@ -174,3 +193,20 @@ def test_the_line_of_a_stage_has_digits_for_an_observable_of_any_size():
     assert AscentResult.line.fget(walk) == "0.0512, 0.0731. Between."
     scanned = SimpleNamespace(path="h", values=(1, 2), observable="share", means=means, smallest_difference=0.02)
     assert ScanResult.line.fget(scanned) == "h: 1 → 0.0512, 2 → 0.0731; smallest difference seen 0.02"
+
+
+def test_a_walk_is_predicted_from_where_the_other_factors_stay():
+    """Factors that are not walked stay at their references, off the middles of their ranges; without noise."""
+    study = study_with()
+    by_name = {one.name: one for one in study.factors}
+    by_name["X1"] = dataclasses.replace(by_name["X1"], reference=by_name["X1"].level(0.5))
+    study = dataclasses.replace(study, factors=tuple(by_name.values()))
+    slopes = {"X7": 4.0, "X4": 3.0, "X16": 2.0, "X1": 1.0}
+
+    def formula(values):
+        levels = {name: by_name[name].coded(values.get(by_name[name].path, by_name[name].reference)) for name in slopes}
+        return 24.0 + sum(slope * levels[name] for name, slope in slopes.items())
+
+    walked = run_campaign(study, PROFILE, FormulaRunner(formula, sigma=1e-6), BIAS).stages.ascent
+    assert "X1" not in [factor.name for factor in walked.factors]
+    assert walked.path.predicted == pytest.approx(walked.means, abs=1e-4)

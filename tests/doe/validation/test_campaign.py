@@ -132,7 +132,7 @@ def test_time_that_is_over_stops_it_cleanly(order, tmp_path):
     said = []
     late = dataclasses.replace(order, out=tmp_path, store=tmp_path / "empty.sqlite", minutes=1e-4)
     assert run_campaign(late, said.append) == []
-    assert "goes on" in said[-1]
+    assert "the same command continues" in said[-1]
 
 
 def test_the_verdict_depends_on_numbers_only(order, rows, tmp_path):

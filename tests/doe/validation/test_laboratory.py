@@ -119,9 +119,13 @@ def test_scanners_are_drawn_from_the_file_s_ranges(tmp_path):
 
 def test_outside_effects_are_those_that_there_can_be():
     scene = read_laboratory(TREFOILS).declared.scene
-    assert possible_outside(scene) == tuple(OUTSIDE_EFFECTS)
+    assert possible_outside([scene]) == tuple(OUTSIDE_EFFECTS)
     cylinder = in_rig(scene, "lifting_cylinder")
-    assert set(OUTSIDE_EFFECTS) - set(possible_outside(cylinder)) == {"sticky_funnel", "draught", "raised_funnel"}
+    assert set(OUTSIDE_EFFECTS) - set(possible_outside([scene, cylinder])) == {
+        "sticky_funnel",
+        "draught",
+        "raised_funnel",
+    }
 
 
 def test_a_set_is_there_once_it_is_judged_by_every_kind_of_data(tmp_path):

@@ -133,6 +133,7 @@ def test_a_file_gives_back_what_was_written_and_can_be_gone_on_with(tmp_path):
     for kind, blocks in at_once.sample.pours.items():
         for one, other in zip(blocks, there.sample.pours[kind], strict=True):
             assert np.array_equal(one, other)
+            assert one.dtype == other.dtype == np.float64
 
 
 def test_another_file_is_refused_in_one_line(tmp_path):

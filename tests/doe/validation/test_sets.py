@@ -61,26 +61,29 @@ def test_wilson_interval_is_that_of_statsmodels(hits, sets):
 
 
 @pytest.mark.parametrize(
-    ("verdict", "label", "answer"),
+    ("verdict", "kind", "label", "answer"),
     [
-        ("no_missing_effect", "none", "nothing"),
-        ("no_missing_effect", "a", "nothing"),
-        ("effect:a", "a", "right"),
-        ("effect:a", "none", "wrong"),
-        ("effect:a", "a+b", "wrong"),
-        ("effects:b+a", "a+b", "right"),
-        ("effects:a+c", "a", "wrong"),
-        ("ambiguous:b,a", "a", "undecided"),
-        ("ambiguous:b,c", "a", "wrong"),
-        ("ambiguous:b,no_missing_effect", "a", "wrong"),
-        ("ambiguous:b,no_missing_effect", "none", "undecided"),
-        ("ambiguous:a+b,a+c", "a+b", "undecided"),
-        ("unexplained", "sticky_funnel", "unexplained"),
-        ("out of reach: bounds", "a", "out of reach"),
+        ("no_missing_effect", "null", "none", "nothing"),
+        ("no_missing_effect", "effect", "a", "nothing"),
+        ("effect:a", "effect", "a", "right"),
+        ("effect:a", "null", "none", "wrong"),
+        ("effect:a", "pair", "a+b", "wrong"),
+        ("effects:b+a", "pair", "a+b", "right"),
+        ("effects:a+c", "effect", "a", "wrong"),
+        ("ambiguous:b,a", "effect", "a", "undecided"),
+        ("ambiguous:b,c", "effect", "a", "wrong"),
+        ("ambiguous:b,no_missing_effect", "effect", "a", "wrong"),
+        ("ambiguous:b,no_missing_effect", "null", "none", "undecided"),
+        ("ambiguous:a+b,a+c", "pair", "a+b", "undecided"),
+        ("unexplained", "outside", "sticky_funnel", "unexplained"),
+        ("ambiguous:b,unexplained", "outside", "sticky_funnel", "undecided"),
+        ("ambiguous:b,unexplained", "effect", "a", "wrong"),
+        ("ambiguous:b,c", "outside", "sticky_funnel", "wrong"),
+        ("out of reach: bounds", "effect", "a", "out of reach"),
     ],
 )
-def test_what_an_answer_is_worth(verdict, label, answer):
-    assert answer_to(verdict, label) == answer
+def test_what_an_answer_is_worth(verdict, kind, label, answer):
+    assert answer_to(verdict, kind, label) == answer
 
 
 @pytest.mark.parametrize(

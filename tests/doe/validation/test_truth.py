@@ -49,6 +49,12 @@ def test_the_amplitude_follows_the_strength():
     assert abs(density) == pytest.approx(0.3 * math.sqrt(6.0 / 8.0))
 
 
+def test_a_direction_that_the_ruler_does_not_see_says_nothing_of_the_power():
+    unseen = reached("density", "density +", (0.3,), 0.0, 1.0), reached("density", "density -", (-0.3,), 12.0)
+    ((_, (density,)),) = truth_of(case(0, label="density"), strengths_of(unseen, DECLARED, {})).effects
+    assert density == pytest.approx(-0.3 * 6.0 / 12.0)
+
+
 def test_directions_are_drawn():
     signs = {np.sign(truth_of(case(k, label="density"), STRENGTHS).effects[0][1][0]) for k in range(20)}
     assert signs == {-1.0, 1.0}
