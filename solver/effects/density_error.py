@@ -15,7 +15,10 @@ from solver.scenes.body import Body, Members
 
 @dataclass(frozen=True)
 class DensityError(SetUpEffect):
-    """Relative error of the bodies' density; ``excess`` is the amplitude."""
+    """Relative error of the bodies' density; ``excess`` is the amplitude.
+
+    The poured mass stays, and with it goes the number of bodies; in a drum the filled volume stays, and the number.
+    """
 
     excess: float = param(0.0, low=-0.5, high=1.0, doc="Relative excess x of the density.")
 

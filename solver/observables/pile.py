@@ -178,12 +178,12 @@ def footprint_r90(reading: PileReading) -> Value:
 
 
 def centroid_x(reading: PileReading) -> Value:
-    """Centre of mass relative to the funnel's axis, along x."""
+    """Centre of mass relative to the rig's axis as it was measured (``Scene.axis``), along x."""
     return Value(float(reading.centre[0]) - reading.pile.axis[0], "m")
 
 
 def centroid_y(reading: PileReading) -> Value:
-    """Centre of mass relative to the funnel's axis, along y."""
+    """Centre of mass relative to the rig's axis as it was measured (``Scene.axis``), along y."""
     return Value(float(reading.centre[1]) - reading.pile.axis[1], "m")
 
 

@@ -7,11 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import ConvexHull
 
 if TYPE_CHECKING:
     from solver.pours.record import Pile, Spheres
 
 Array = npt.NDArray[np.float64]
+
+EQUAL = 1e-6
+"""Difference of two principal moments, as a share of the largest, up to which they count as equal."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +121,9 @@ def radius_holding(share: float, radius: Array, mass: Array) -> float:
 def body_thicknesses(pile: Pile) -> Array:
     """Smallest extent of each body along its principal axes [m], shape (n,), at the body's own size.
 
-    Principal axes of the member spheres' centres; a flat body that lies on the plate is this high.
+    Principal axes of the member spheres' centres; a flat body that lies on the plate is this high. Where the two or
+    three shortest axes are equal, as those of a square bar or a cube, it is the least extent in any direction among
+    them, exact for equal spheres.
     """
     spheres = pile.spheres
     _, body = np.unique(spheres.body, return_inverse=True)
@@ -126,12 +132,37 @@ def body_thicknesses(pile: Pile) -> Array:
     offset = spheres.centre - mean[body]
     scatter = np.zeros((members.size, 3, 3))
     np.add.at(scatter, body, offset[:, :, None] * offset[:, None, :])
-    thin_axis = np.linalg.eigh(scatter)[1][:, :, 0]
+    moments, axes = np.linalg.eigh(scatter)
+    thin_axis = axes[:, :, 0]
+    equal = moments - moments[:, :1] <= EQUAL * moments[:, 2:]
+    # Balls and rows of spheres are as thick in one direction as in the other.
+    for b in np.flatnonzero(equal[:, 1] & (moments[:, 1] > EQUAL * moments[:, 2])):
+        free, mine = axes[b][:, equal[b]], body == b
+        thin_axis[b] = free @ _narrowest(offset[mine] @ free, spheres.radius[mine])
     along = np.einsum("mk,mk->m", offset, thin_axis[body])
     top, bottom = np.full(members.size, -np.inf), np.full(members.size, np.inf)
     np.maximum.at(top, body, along + spheres.radius)
     np.minimum.at(bottom, body, along - spheres.radius)
     return top - bottom
+
+
+def _narrowest(centre: Array, radius: Array) -> Array:
+    """Unit vector (k,), k = 2 or 3, along which spheres at ``centre`` (n, k) of ``radius`` (n,) have the least extent.
+
+    The width of a convex polytope is least across a face, or between two edges (Houle and Toussaint 1988,
+    doi 10.1109/34.6790).
+    """
+    k, hull = centre.shape[1], ConvexHull(centre)
+    ways = hull.equations[:, :k]
+    if k == 3:
+        edges = np.concatenate([centre[hull.simplices[:, [i, j]]] for i, j in ((0, 1), (1, 2), (2, 0))])
+        edges = edges[:, 1] - edges[:, 0]
+        across = np.cross(edges[:, None], edges[None]).reshape(-1, 3)
+        length = np.linalg.norm(across, axis=1)
+        skew = length > EQUAL * length.max()
+        ways = np.concatenate([ways, across[skew] / length[skew, None]])
+    extent = (centre @ ways.T + radius[:, None]).max(axis=0) - (centre @ ways.T - radius[:, None]).min(axis=0)
+    return np.asarray(ways[extent.argmin()])
 
 
 def body_thickness(pile: Pile) -> float:

@@ -375,7 +375,12 @@ class Pour:
         if not may_be_over(moment):
             return moment
         across, number = self._at_outlet()
-        return replace(moment, across=across, waiting=number)
+        return replace(moment, across=across, waiting=number, spilled=self._spilled())
+
+    def _spilled(self) -> float:
+        """Mass that had left the rig when its gate opened [kg]; 0 in a rig without a gate."""
+        opened = (row["discharged"] for row in self.samples if row["time"] >= self.gate_opened > 0.0)
+        return next(opened, 0.0)
 
     def _ramp_steps(self) -> int:
         """Steps between two changes of the constants."""

@@ -53,6 +53,8 @@ class Moment:
     """What lies across the outlet; looked for only when the pour may be over."""
     waiting: int = 0
     """Number of bodies in the container over its outlet; counted only then."""
+    spilled: float = 0.0
+    """Mass that went over the rim while the gate was shut [kg]; counted only then."""
 
 
 def verdict(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
@@ -145,18 +147,29 @@ def _come_to_rest(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
             return Outcome.JAMMED, f"nothing passes the outlet: {left}, stay"
         if moment.waiting > numerics.hanging_bodies:
             return Outcome.JAMMED, f"{moment.waiting} bodies stay over the outlet of the {_name(rig)}"
-        return Outcome.AT_REST, ""
+        return _rests(rig, moment, "")
     if stay:
         return Outcome.JAMMED, f"{row['hanging']:.0f} bodies ({left}) stay in the {_name(rig)}"
     if across is not None:
-        return Outcome.AT_REST, _across(across, rig, moment)
-    return Outcome.AT_REST, "" if empty else f"{left}, hang in the {_name(rig)}"
+        return _rests(rig, moment, _across(across, rig, moment))
+    return _rests(rig, moment, "" if empty else f"{left}, hang in the {_name(rig)}")
 
 
 def may_be_over(moment: Moment) -> bool:
     """Whether the rig has received all that it can take and has completed its actions, and what counts is slow."""
     fed = moment.acting is not None and moment.acted and (moment.missing == 0 or moment.blocked)
     return fed and moment.quiet
+
+
+def _rests(rig: PourRig, moment: Moment, words: str) -> Verdict:
+    """At rest; a rig that is refilled may have been filled over its rim: what spilled lies in or beside the pile."""
+    if moment.spilled > 0.0:
+        share = _share(moment.spilled, moment)
+        over = (
+            f"{_grams(moment.spilled)}, {share} of the charge, went over the rim of the {_name(rig)} as it was filled"
+        )
+        words = f"{words}; {over}" if words else over
+    return Outcome.AT_REST, words
 
 
 def _name(rig: PourRig) -> str:

@@ -130,7 +130,8 @@ def _reaches_both_sides(outlet: Outlet, place: Array, radius: Array, middle: Arr
     """
     from_middle = outlet.across(place)
     at_edge = np.linalg.norm(from_middle, axis=1) + radius >= EDGE * outlet.half_width
-    arms, start = (place - middle)[at_edge], from_middle[at_edge]
+    # Along a slot nothing is opposite.
+    arms, start = (from_middle - outlet.across(middle[None]))[at_edge], from_middle[at_edge]
     way = start[None, :, :] - start[:, None, :]
     length2 = np.maximum((way**2).sum(axis=2), 1e-30)
     share = np.clip(-(start[:, None, :] * way).sum(axis=2) / length2, 0.0, 1.0)

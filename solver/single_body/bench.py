@@ -77,6 +77,8 @@ class Bench:
         self.batch = Batch(dataclasses.replace(ROOM, **compiled_in([self.scene])))
         order = np.zeros(1, dtype=np.int32)
         self.batch.load(0, self.scene, body_tables(self.scene, order), self.dt, (True,) * len(rig.surfaces()))
+        # A bench is level, however the rig of the pile is tilted.
+        self.batch.set_gravity(0, (0.0, 0.0, -math.hypot(*scene.gravity)))
 
     def put(self, position: Array, quaternion: Array = UPRIGHT) -> None:
         """Place the specimen at rest: centre of mass [m] and orientation wxyz."""

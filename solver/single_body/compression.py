@@ -27,7 +27,9 @@ Array = npt.NDArray[np.float64]
 UPPER = 1
 """Index of the plate that moves."""
 MOMENTS = 200
-"""Number of readings while squeezing, and again while shearing."""
+"""Largest number of readings while squeezing, and again while shearing."""
+FEWEST = 20
+"""Fewest readings that a modulus is fitted to."""
 SETTLING = 0.02
 """Time at rest between squeezing and shearing [s]."""
 
@@ -83,12 +85,13 @@ def measure(scene: Scene, seed: int) -> BenchResult:
 
 
 def _squeeze(bench: Bench, rig: Compression) -> tuple[Array, Array]:
-    """Approach of the plates [m] and force on the upper one [N], at ``MOMENTS`` moments."""
+    """Approach of the plates [m] and force on the upper one [N], at up to ``MOMENTS`` moments."""
     duration = rig.strain * rig.gap / rig.speed
+    number = _moments(bench, rig, duration)
     bench.batch.set_motion(0, UPPER, (0.0, 0.0, -rig.speed), (0.0, 0.0, 0.0))
-    approach, force = np.zeros(MOMENTS), np.zeros(MOMENTS)
-    for k in range(MOMENTS):
-        bench.run(duration / MOMENTS)
+    approach, force = np.zeros(number), np.zeros(number)
+    for k in range(number):
+        bench.run(duration / number)
         plate = bench.batch.surface_state(0)[UPPER]
         approach[k], force[k] = rig.gap - plate[2], plate[15]
     bench.batch.set_motion(0, UPPER, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -99,10 +102,22 @@ def _squeeze(bench: Bench, rig: Compression) -> tuple[Array, Array]:
 def _shear(bench: Bench, rig: Compression, shift: float) -> tuple[Array, Array]:
     """Slip of a contact [m] (half of the plate's shift) and tangential force on the upper plate [N] against it."""
     origin = bench.batch.surface_state(0)[UPPER, 0]
+    number = _moments(bench, rig, shift / rig.speed)
     bench.batch.set_motion(0, UPPER, (rig.speed, 0.0, 0.0), (0.0, 0.0, 0.0))
-    slip, force = np.zeros(MOMENTS), np.zeros(MOMENTS)
-    for k in range(MOMENTS):
-        bench.run(shift / rig.speed / MOMENTS)
+    slip, force = np.zeros(number), np.zeros(number)
+    for k in range(number):
+        bench.run(shift / rig.speed / number)
         plate = bench.batch.surface_state(0)[UPPER]
         slip[k], force[k] = 0.5 * (plate[0] - origin), -plate[13]
     return slip, force
+
+
+def _moments(bench: Bench, rig: Compression, duration: float) -> int:
+    """Number of readings in ``duration`` [s], each at least one time step long; raises ParameterError if too few."""
+    number = min(MOMENTS, int(duration / bench.dt))
+    if number < FEWEST:
+        raise ParameterError(
+            f"rig.speed: {rig.speed:g} m/s leaves {number} time steps of {bench.dt:.3g} s for the motion; at least "
+            f"{FEWEST} are needed: a lower speed"
+        )
+    return number

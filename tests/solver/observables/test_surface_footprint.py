@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from solver.observables.packing import bulk_density, solid_fraction
 from solver.observables.pile import (
@@ -17,7 +20,8 @@ from solver.observables.pile import (
     stray_fraction,
 )
 from solver.observables.reading import PileReading
-from solver.observables.surface import body_thickness, radius_holding
+from solver.observables.surface import body_thickness, body_thicknesses, radius_holding
+from solver.pours.record import Spheres
 from tests.solver.observables.made_up import (
     SEED_AXES,
     balls,
@@ -97,6 +101,32 @@ def test_the_thickness_of_seeds_is_their_shortest_axis():
     pile = seeds_in_cone(25.0, 20, np.random.default_rng(1), reach=1.0)
     assert body_thickness(pile) == pytest.approx(SEED_AXES[2], rel=1e-9)
     assert body_thickness(balls(np.eye(3) * 0.01)) == pytest.approx(6e-3, rel=1e-12)
+
+
+def turned_clumps(centres, number=40, radius=1e-3):
+    """Clumps of spheres at ``centres`` [radii], each turned at random, side by side."""
+    turns = Rotation.random(number, random_state=3).as_matrix()
+    place = np.column_stack([np.arange(number) * 0.05, np.zeros(number), np.full(number, 0.05)])
+    where = (radius * np.einsum("bij,mj->bmi", turns, centres) + place[:, None]).reshape(-1, 3)
+    return Spheres(where, np.full(len(where), radius), np.repeat(np.arange(number), len(centres)))
+
+
+@pytest.mark.parametrize(
+    ("shape", "thickness"),
+    [
+        ([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], 4.0),
+        ([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-3, -1, 1, 3)], 4.0),
+        ([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], 4.0),
+        ([[-1, 0, 0], [1, 0, 0]], 2.0),
+        ([[-1, -1, 0], [-1, 1, 0], [1, -1, 0], [1, 1, 0]], 2.0),
+    ],
+    ids=["cube", "square bar", "tetrahedron, between two edges", "dumbbell", "square plate"],
+)
+def test_the_thickness_of_shapes_with_equal_axes_does_not_depend_on_how_they_lie(shape, thickness):
+    spheres = turned_clumps(np.array(shape, dtype=float))
+    number = int(spheres.body[-1]) + 1
+    pile = dataclasses.replace(balls(np.eye(3) * 0.01), spheres=spheres, mass=np.ones(number))
+    assert body_thicknesses(pile) == pytest.approx(np.full(number, thickness * 1e-3), rel=1e-9)
 
 
 def test_bulk_density_and_solid_fraction_of_a_block():

@@ -137,14 +137,18 @@ def test_a_slow_feed_is_no_jam():
     assert record.trace.entered_mass[-1] == pytest.approx(record.poured_mass)
 
 
-def test_a_funnel_that_is_full_to_the_inlet_opens_its_gate():
+def test_a_funnel_that_is_full_to_the_inlet_opens_its_gate_and_tells_what_went_over_its_rim():
     small = {"rig.inlet_diameter": "100mm", "rig.outlet_diameter": "60mm", "rig.cone_height": "15mm"}
     scene = with_values(
         QUICK,
         {**small, "insertion.protocol": "fill_then_open", "insertion.rate": "500g/s", "rig.mass": "40g"},
     )
-    pour = drive(scene, 4, until=2.5)
+    pour = drive(scene, 4)
     assert pour.gate_opened > 0.0
+    assert pour.outcome == Outcome.AT_REST
+    spilled = next(row["discharged"] for row in pour.samples if row["time"] >= pour.gate_opened)
+    share = f"{1e3 * spilled:.3g} g, {100.0 * spilled / 0.04:.0f} % of the charge"
+    assert pour.message == f"{share}, went over the rim of the funnel as it was filled"
 
 
 def test_outcomes_do_not_depend_on_how_steps_are_launched():

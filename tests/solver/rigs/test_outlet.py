@@ -10,7 +10,7 @@ from solver.pours.pour import Pour
 from solver.pours.raw_pour import packed, unpacked
 from solver.pours.record import Bodies, Outcome, Spheres
 from solver.pours.run import capacity_for
-from solver.rigs.outlet import RoundOutlet, Slot, obstruction, waiting
+from solver.rigs.outlet import RoundOutlet, Slot, _reaches_both_sides, obstruction, waiting
 from solver.scenes.body import Members
 from solver.scenes.scene import with_values
 from tests.solver.pours.test_pour import COARSE
@@ -97,6 +97,13 @@ def test_over_a_slot_the_way_across_counts_and_what_lies_beside_it_belongs_there
     across = found(*placed((LEVEL, (1.0, 0.0, 0.0)), above=[over, beside]), outlet=SLOT, keeps=True)
     assert across.above == pytest.approx(1e-3)
     assert found(*placed((LEVEL, (0.0, 1.0, 0.0)), above=[over]), outlet=SLOT, keeps=True) is None
+
+
+def test_a_bent_body_across_a_slot_reaches_both_edges_wherever_along_it():
+    """Its middle is off the line between the ends, along the slot; across it, they are on opposite sides."""
+    ends, middle = np.array([[-HALF, 0.06], [HALF, 0.06]]), np.zeros(2)
+    assert _reaches_both_sides(SLOT, ends, np.full(2, 1e-3), middle)
+    assert not _reaches_both_sides(SLOT, np.array([[HALF, 0.06], [HALF, -0.06]]), np.full(2, 1e-3), middle)
 
 
 def test_what_lies_beside_a_slot_is_no_arch_under_the_body_across_it():

@@ -155,6 +155,27 @@ def test_the_apparent_modulus_is_that_of_equation_1_and_no_constant():
     assert shown[50] > 1.5 * shown[-1]
 
 
+def test_a_plate_that_moves_fast_is_read_less_often_or_refused(monkeypatch):
+    """The shear of some 2 µm takes 39 steps of 56 µs at 1 mm/s, and 3 at 1 cm/s."""
+    readings, shear = [], compression._shear
+
+    def noted(*arguments):
+        readings.append(shear(*arguments))
+        return readings[-1]
+
+    monkeypatch.setattr(compression, "_shear", noted)
+    result = run_bench_test(bead_on("compression", 0.3, **{"rig.speed": 1e-3}))
+    found = result.quantity("effective_youngs_modulus")
+    assert found.value == pytest.approx(found.reference, rel=0.01)
+    ((slip, _),) = readings
+    assert compression.FEWEST <= len(slip) < compression.MOMENTS
+    assert np.ptp(np.diff(slip)) == pytest.approx(0.0, abs=1e-3 * slip[-1])
+    with pytest.raises(
+        ParameterError, match=r"rig\.speed: 0\.01 m/s leaves \d+ time steps of .* at least 20 are needed"
+    ):
+        run_bench_test(bead_on("compression", 0.3, **{"rig.speed": 1e-2}))
+
+
 def test_without_friction_there_is_no_shear_modulus_to_measure():
     result = run_bench_test(bead_on("compression", 0.0))
     assert math.isnan(result.quantity("effective_shear_modulus").value)

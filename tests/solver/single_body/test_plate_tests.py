@@ -81,6 +81,11 @@ def test_restitution_that_falls_with_speed_is_that_of_the_impact(bead):
     )
 
 
+def test_a_tilted_pile_leaves_the_bench_level(bead):
+    for name in PLATE_TESTS:
+        assert measured(bead, name, plate_tilt__tilt_x=8.0) == pytest.approx(measured(bead, name), rel=1e-9)
+
+
 def test_a_smooth_plate_holds_nothing(bead):
     smooth = with_settings(bead, {"pair.bead.steel.static_friction": 0.0})
     assert measured(smooth, STATIC) == NOTHING
