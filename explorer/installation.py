@@ -237,7 +237,7 @@ def _cores() -> Finding:
 
 
 def _memory() -> Finding:
-    from explorer.study.duration import WORKER_GB
+    from explorer.scene.pour_cost import WORKER_GB
 
     wanted = PAGE_GB + available_cores() * WORKER_GB
     there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9

@@ -10,7 +10,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from doe.declared.pours import Ended
+from doe.declared.pour_end import Ended
 from explorer.background.progress import PourProgress, SimulatedTime
 from explorer.background.reporter import Reporter
 from explorer.errors import CommandError

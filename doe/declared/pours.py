@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections import deque
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from doe.declared.model import effect_values, in_rig_frame
 from doe.declared.points import AS_IT_IS, Point, View
+from doe.declared.pour_end import Ended, OnPour
 from doe.measurement.features import feature_set, features_of_record
 from doe.measurement.measurement import Condition, Observation
 from doe.pour_runner import Pours, seed_of, stored_run
@@ -22,39 +23,6 @@ from solver import EFFECTS, Job, Outcome, ParameterError, Record, Scene, observe
 PROFILE = "height_profile_m"
 ROOT = 0
 """Root of the seeds: the same for every data set of a model, so that its pours are found again in the store."""
-
-
-@dataclass(frozen=True)
-class Ended:
-    """How one pour ended. ``label``: point and condition.
-
-    A failed pour is not repeated with another seed: the other points suffice for the emulator.
-    """
-
-    label: str
-    seed: int
-    outcome: Outcome
-    message: str
-    replicate: int = 0
-    attempt: int = 0
-    wall_s: float = 0.0
-    """Wall time of the pour [s]."""
-    reused: bool = False
-    """Always false here: pours found in the store are not reported."""
-
-    @property
-    def title(self) -> str:
-        """Its name in lists."""
-        return self.label
-
-    @property
-    def valid(self) -> bool:
-        """Whether the run came to its end."""
-        return self.outcome.valid
-
-
-OnPour = Callable[[str, int, Ended], None]
-"""Called with (what is being run, number of pours left, how this pour ended)."""
 
 
 @dataclass(frozen=True)

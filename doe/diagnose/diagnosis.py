@@ -12,7 +12,8 @@ import numpy.typing as npt
 from doe.declared.bodies import body_evidence, wanted_bodies
 from doe.declared.budget import Budget
 from doe.declared.model import Declared, declare
-from doe.declared.pours import ROOT, ModelPours, OnPour
+from doe.declared.pour_end import OnPour
+from doe.declared.pours import ROOT, ModelPours
 from doe.diagnose.candidate_experiments import CandidateExperiments, acting_in, checked_by_bodies, next_experiment
 from doe.diagnose.compared_features import Compared, measured, weighed
 from doe.diagnose.confirm import Confirmed, confirm, model_of, residual_maps

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from multiprocessing.pool import Pool
 from typing import Any, Protocol
 
-from doe.declared.pours import Ended
+from doe.declared.pour_end import Ended
 from doe.measurement import Condition, readings_of_record
 from doe.pour_runner import Pours, stored_run
 from doe.store import Store

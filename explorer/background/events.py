@@ -14,7 +14,7 @@ from doe.record import Record
 from solver import TABLE
 
 if TYPE_CHECKING:
-    from doe.declared.pours import Ended
+    from doe.declared.pour_end import Ended
     from doe.run_records import Run
 
 PROGRESS = "progress.jsonl"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from explorer.background.events import EventKind, ProgressEvent, TriedRun
 
 if TYPE_CHECKING:
-    from doe.declared.pours import Ended
+    from doe.declared.pour_end import Ended
     from doe.pour_runner import Pours
     from doe.run_records import Run
     from explorer.background.reporter import Reporter

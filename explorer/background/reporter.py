@@ -26,15 +26,17 @@ from contextvars import ContextVar
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import IO, Self
+from typing import IO, TYPE_CHECKING, Self
 
 from doe.errors import StudyStopped
-from doe.pour_runner import Pours
 from explorer.background.bar import Bar
 from explorer.background.events import PROGRESS, Ending, ProgressEvent
 from explorer.files.output_file import write_whole
 from explorer.scene.text import material_toml
 from solver import Job, PourBrokeOff, Record, Scene
+
+if TYPE_CHECKING:
+    from doe.pour_runner import Pours
 
 LOG = "log.jsonl"
 """File in the output folder of the command."""

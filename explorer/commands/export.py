@@ -59,7 +59,7 @@ def export(
     from explorer.export.target import ExportOrder
     from explorer.files.run_folder import appearing
     from explorer.scene.file import named_scene, with_settings
-    from explorer.study.duration import large_pour_text
+    from explorer.scene.pour_cost import large_pour_text
     from solver import ParameterError, parameters, with_values
 
     if to not in EXPORTS:

@@ -31,7 +31,7 @@ def repeat(
     from explorer.background.reporter import end_as_by_ctrl_c, reporter_of
     from explorer.population.run import PoursOrder, pour_more
     from explorer.scene.file import load_scene, with_settings
-    from explorer.study.duration import large_pour_text
+    from explorer.scene.pour_cost import large_pour_text
     from explorer.terminal.text_table import text_table
     from solver import check_scheduler
 

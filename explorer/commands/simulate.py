@@ -65,8 +65,8 @@ def simulate(
     from explorer.background.reporter import EVERY, Reporter, end_as_by_ctrl_c
     from explorer.errors import CommandError
     from explorer.files.run_folder import json_text
+    from explorer.scene.pour_cost import large_pour_text
     from explorer.simulation import SimulateOrder, run_bench, run_simulation, simulation_of
-    from explorer.study.duration import large_pour_text
     from explorer.terminal.pours import RunTable, bench_text
 
     end_as_by_ctrl_c()

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from doe.declared.model import Declared, declare
-from doe.declared.pours import Ended, ModelPours
+from doe.declared.pour_end import Ended
+from doe.declared.pours import ModelPours
 from doe.diagnose.training_amplitudes import REPLICATES
 from doe.measurement import Measurement, load_measurement
 from doe.measurement.features import OFFERS, feature_set

@@ -56,7 +56,7 @@ from explorer.files.output_file import check_new_file, check_vacant, write_whole
 from explorer.files.run_result import made_today, versions
 from explorer.report.diagnosis import diagnosis_report
 from explorer.report.folder import write_report
-from explorer.study.duration import large_pour_text
+from explorer.scene.pour_cost import large_pour_text
 from solver import EFFECTS, Executor, executor, value
 
 RULE = Rule(

@@ -13,10 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from doe.studies.study import load_study, with_profile
-from doe.studies.study_result import StudyResult
 from explorer.errors import CommandError
-from explorer.report.identified import settings
 from solver import ParameterError, Scene, is_material, load_material, naming_file, read_toml, with_set_up, with_values
 from solver.assets import AssetKind, AssetNotFoundError, asset_path, own_path, shipped_assets
 from solver.rigs import BENCH_RIGS, RIGS
@@ -118,6 +115,8 @@ def _set_up_scene(table: dict[str, Any], path: Path) -> Scene:
 
 def study_scene(path: Path) -> Scene:
     """The scene of a study file: its material and set-up with every factor at its reference."""
+    from doe.studies.study import load_study  # here: most scenes are of no study, whose modules take a second to load
+
     with naming_file(path, *WRONG):
         return load_study(str(path)).scene
 
@@ -156,6 +155,10 @@ def calibrated_scene(source: str) -> tuple[Scene, str]:
     Raises CommandError for a result that is not from `explorer calibrate`, and ParameterError or AssetNotFoundError if
     its study no longer exists or has changed so that the optimum does not fit it.
     """
+    from doe.studies.study import load_study, with_profile
+    from doe.studies.study_result import StudyResult
+    from explorer.report.identified import settings
+
     path = own_path(source) / RESULT
     try:
         result = StudyResult.from_dict(json.loads(path.read_text(encoding="utf-8")))

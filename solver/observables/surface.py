@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import ConvexHull
 
 if TYPE_CHECKING:
     from solver.pours.record import Pile, Spheres
@@ -152,6 +151,8 @@ def _narrowest(centre: Array, radius: Array) -> Array:
     The width of a convex polytope is least across a face, or between two edges (Houle and Toussaint 1988,
     doi 10.1109/34.6790).
     """
+    from scipy.spatial import ConvexHull  # here: few shapes have equal axes, and scipy takes 0.3 s to load
+
     k, hull = centre.shape[1], ConvexHull(centre)
     ways = hull.equations[:, :k]
     if k == 3:

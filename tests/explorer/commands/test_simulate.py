@@ -3,6 +3,8 @@
 import csv
 import dataclasses
 import json
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 from types import SimpleNamespace
@@ -89,6 +91,23 @@ def test_the_folder_holds_the_run(simulation, record):
 def test_nothing_but_results_is_left(simulation):
     names = sorted(path.name for path in simulation[1].iterdir())
     assert names == ["pour_5.rrd", "pour_6.rrd", "run"]
+
+
+def test_a_pour_loads_nothing_of_studies_measurements_and_reports():
+    """These take over a second to load, of some three that a start takes."""
+    code = """
+import sys
+from explorer.cli import main
+sys.argv = ["explorer", "simulate", "funnel", "--set", "numerics.max_time=0.1s", "--json"]
+try:
+    main()
+finally:
+    late = {"scipy.stats", "scipy.optimize", "plotly", "PIL", "doe.studies", "doe.measurement", "explorer.report"}
+    print(*sorted(late & set(sys.modules)), file=sys.stderr)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert json.loads(done.stdout)["runs"]
+    assert done.stderr.split() == []
 
 
 def test_means_are_over_the_replicates_at_rest(record, monkeypatch):

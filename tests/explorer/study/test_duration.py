@@ -8,7 +8,8 @@ from doe.stages import planned_runs
 from doe.store import Store, StoredRun
 from doe.studies.study import load_study, with_profile
 from explorer.export import EXPORTS
-from explorer.study.duration import PACE, PACES, SETTLING, SPHERE_GB, WORKER_GB, duration_text, large_pour_text
+from explorer.scene.pour_cost import PACE, PACES, SETTLING, SPHERE_GB, WORKER_GB, large_pour_text
+from explorer.study.duration import duration_text
 from solver import PHYSICS, ParameterError, body_counts, value, with_rig, with_values
 from solver.pours.run import MOST_BODIES, sizes_for
 from solver.rigs.funnel import Funnel

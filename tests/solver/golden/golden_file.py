@@ -191,11 +191,16 @@ def write(golden: Golden) -> None:
     np.savez_compressed(FIRST_STEPS, allow_pickle=False, **golden.first_steps)
 
 
-def main() -> int:
-    """Take all bits and record them; 1 where that is refused."""
+def of_today() -> Golden:
+    """What the solver of today does, in a process in which Taichi has not started."""
     backend.init(threads=2)
     with tempfile.TemporaryDirectory() as folder:
-        now = taken(Path(folder))
+        return taken(Path(folder))
+
+
+def main() -> int:
+    """Take all bits and record them; 1 where that is refused."""
+    now = of_today()
     try:
         write(recorded(read() if FILE.exists() else None, now))
     except RefusalError as error:
