@@ -39,8 +39,10 @@ missed at 0.60 to 0.66, and half of the sets without an effect are above 0.74 (r
 DOUBTED = 0.1
 """Probability of data as far off the declared model below which an effect may be named. For 43 names (roots 1 and 2) it
 was 0.02 at most, but 0.65 for the one where nothing was missing: a parameter far off its mean looked like an effect.
-Many features can hide a misfit in a few (0.9 and 0.15 for two effects by scans of root 3, at odds of 10⁵). So a name
-also stands if it would with the declared model's parameters measured at their best fit (:func:`in_doubt`)."""
+Many features can hide a misfit in a few (0.9 and 0.15 for two effects by scans of root 3): see ``HIDDEN``."""
+HIDDEN = 1e-3
+"""Probability of the declared model, its parameters measured at their best fit, below which a name stands beside it
+although it fits. The two of root 3 are at odds of 10⁴ and 10⁵, a wrong name of root 6 (set 22) was at 240."""
 CREDIBLE = 0.95
 """Probability that the set of an ambiguous answer holds."""
 MOST_PAIRS = 5
@@ -97,7 +99,7 @@ class Verdict(Record):
 def answer(found: Posterior, followed_up: bool, by_bodies: bool = False) -> tuple[str, tuple[str, ...], str]:
     """Kind, names and statement for a posterior. ``by_bodies``: whether follow-ups were of single bodies alone."""
     name, sure = candidate(found, followed_up)
-    p, doubted = found.effects.get(name, 0.0), in_doubt(found, sure)
+    p, doubted = found.effects.get(name, 0.0), in_doubt(found)
     if doubted and sure >= THRESHOLD and found.fits[name].p >= FITS:
         if "+" in name and (by_bodies or not followed_up):
             names = tuple(sorted(found.effects, key=lambda one: -found.effects[one])[:2])
@@ -156,13 +158,10 @@ def _likely_pairs(found: Posterior) -> list[str]:
     return sorted(pairs, key=lambda one: -found.effects[one])[:MOST_PAIRS]
 
 
-def in_doubt(found: Posterior, sure: float) -> bool:
-    """Whether an answer of probability ``sure`` may be named: see ``DOUBTED``. Parameters θ cost exp(−½ θᵀθ)."""
+def in_doubt(found: Posterior) -> bool:
+    """Whether an effect may be named: see ``DOUBTED`` and ``HIDDEN``. Parameters θ cost exp(−½ θᵀθ)."""
     base = found.fits["base"]
-    if base.p < DOUBTED:
-        return True
-    forgiven = found.nothing * math.exp(0.5 * TEMPERATURE * float(base.theta @ base.theta))
-    return sure >= THRESHOLD * (1.0 - found.nothing + forgiven)
+    return base.p < DOUBTED or found.nothing * math.exp(0.5 * TEMPERATURE * float(base.theta @ base.theta)) < HIDDEN
 
 
 def candidate(found: Posterior, followed_up: bool) -> tuple[str, float]:

@@ -47,7 +47,7 @@ class Probabilities(Record):
 
 @dataclass(frozen=True)
 class Rule(Record):
-    """Constants of the rule, for the report (`doe.diagnose`); ``doubted``: 1 in results older than this constant.
+    """Constants of the rule, for the report (`doe.diagnose`); ``doubted``, ``hidden``: 1 in results older than these.
 
     ``together``: whether ``contradicted`` is of fitted and held-out data together; in older ones, of the latter alone.
     ``pairs_at_once``: whether two effects may be named without a follow-up, as in older ones.
@@ -63,6 +63,7 @@ class Rule(Record):
     contradicted: float
     strong: float
     doubted: float = 1.0
+    hidden: float = 1.0
     together: bool = False
     pairs_at_once: bool = True
 

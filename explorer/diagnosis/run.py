@@ -21,7 +21,7 @@ from doe.diagnose.confirm import Confirmed
 from doe.diagnose.diagnosis import Diagnosis, joined, run_diagnosis
 from doe.diagnose.posterior import FITS, NOTHING, OUTSIDE, PAIRS
 from doe.diagnose.training_amplitudes import STRONG
-from doe.diagnose.verdict import CREDIBLE, DOUBTED, NOTHING_AT_ONCE, NOTHING_FROM
+from doe.diagnose.verdict import CREDIBLE, DOUBTED, HIDDEN, NOTHING_AT_ONCE, NOTHING_FROM
 from doe.holdout import CONTRADICTED, HoldoutError
 from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Condition, Measurement
@@ -70,6 +70,7 @@ RULE = Rule(
     contradicted=CONTRADICTED,
     strong=STRONG,
     doubted=DOUBTED,
+    hidden=HIDDEN,
     together=True,
     pairs_at_once=False,
 )

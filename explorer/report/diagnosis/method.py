@@ -84,12 +84,11 @@ def _methods(result: DiagnosisResult) -> str:
     conditions = enumeration(
         [f"{row.condition} ({row.features} features, {_pours(result, row.condition)})" for row in result.offered]
     )
-    doubted = (
-        f", unless the calibrated declared model fitted (p ≥ {rule['doubted']}) and the name rested on how far its "
-        "parameters were off their means"
-        if result.rule.doubted < 1.0
-        else ""
-    )
+    why = "the name rested on how far its parameters were off their means"
+    if result.rule.hidden < 1.0:
+        why = f"kept {100.0 * result.rule.hidden:g} % or more with its parameters measured at their best fit"
+    fitted = f", unless the calibrated declared model fitted (p ≥ {rule['doubted']}) and {why}"
+    doubted = fitted if result.rule.doubted < 1.0 else ""
     calibrated = [row.name for row in result.parameters if effect_of(row.name) not in result.given]
     moved = enumeration([parameter_label(name) for name in calibrated])
     held = ""
@@ -155,12 +154,11 @@ def how_reached(result: DiagnosisResult) -> Section:
     """The method in six lines, with the numbers of its rules."""
     rule = {name: number(value) for name, value in vars(result.rule).items()}
     # A result from before this condition existed was judged without it.
-    doubted = (
-        f", and unlikely under the declared model (p < {rule['doubted']}, or the name would stand were its parameters "
-        "measured right where it wants them)"
-        if result.rule.doubted < 1.0
-        else ""
-    )
+    why = "the name would stand were its parameters measured right where it wants them"
+    if result.rule.hidden < 1.0:
+        why = f"it has less than {100.0 * result.rule.hidden:g} % even with its parameters measured at their best fit"
+    unlikely = f", and unlikely under the declared model (p < {rule['doubted']}, or {why})"
+    doubted = unlikely if result.rule.doubted < 1.0 else ""
     taken = f"answer back where a summary contradicts it at p < {rule['contradicted']}, corrected for their number."
     if result.rule.together:
         taken = (

@@ -117,10 +117,13 @@ def test_nothing_is_named_beside_a_declared_model_that_fits(effects):
     assert answer(posterior(0.02, 0.01, effects, base=0.99 * DOUBTED), followed_up=True)[1] == (name,)
 
 
-@pytest.mark.parametrize(("off", "named"), [(0.0, True), (1.5, True), (2.0, False), (3.0, False)])
-def test_a_name_that_does_not_rest_on_a_parameter_far_off_stands_beside_a_model_that_fits(off, named):
-    """At T = 0.7, 0.02 becomes 0.02 exp(0.35 θ²): of 0.95 that leaves 0.9 up to θ = 1.95."""
-    found = posterior(0.02, 0.01, {"a": 0.95, "b": 0.02}, base=0.9, off=off)
+@pytest.mark.parametrize(
+    ("nothing", "off", "named"),
+    [(2e-4, 0.0, True), (2e-4, 2.0, True), (2e-4, 2.3, False), (1e-5, 3.0, True), (0.0041, 0.0, False)],
+)
+def test_a_name_stands_beside_a_model_that_fits_at_odds_that_no_parameter_far_off_makes(nothing, off, named):
+    """At T = 0.7, 2·10⁻⁴ becomes 2·10⁻⁴ exp(0.35 θ²): below 10⁻³ up to θ = 2.14."""
+    found = posterior(nothing, 0.001, {"a": 0.99, "b": 0.0}, base=0.9, off=off)
     assert answer(found, followed_up=False)[0] == ("effect:a" if named else f"ambiguous:a,{NO_EFFECT}")
 
 

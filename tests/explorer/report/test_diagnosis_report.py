@@ -226,8 +226,11 @@ def test_the_method_states_its_rules(result):
         in text
     )
     assert "the data are likely under it (p ≥ 0.01), and unlikely under the declared" in text
-    assert "unless the calibrated declared model fitted (p ≥ 0.1) and the name rested" in diagnosis_markdown(result)
-    younger = ("doubted", "pairs_at_once")
+    assert "or it has less than 0.1 % even with its parameters measured at their best fit)" in text
+    assert "unless the calibrated declared model fitted (p ≥ 0.1) and kept 0.1 % or" in diagnosis_markdown(result)
+    old = result | {"rule": {name: one for name, one in result["rule"].items() if name != "hidden"}}
+    assert "unless the calibrated declared model fitted (p ≥ 0.1) and the name rested" in diagnosis_markdown(old)
+    younger = ("doubted", "hidden", "pairs_at_once")
     before = result | {"rule": {name: one for name, one in result["rule"].items() if name not in younger}}
     assert "effect or pair is named if it reaches 90 %" in diagnosis_markdown(before)
     assert "the declared model (p <" not in diagnosis_markdown(before)
