@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import typer
@@ -46,7 +47,7 @@ def shape(
         file=file,
         unit=unit,
         density=None if density is None else parse_quantity(density, "kg/m3", "--density"),
-        name=name or file.stem,
+        name=name or re.sub(r"[\s.\"\\]+", "_", file.stem),
         out=out,
         number=spheres,
         limit=None if error is None else parse_quantity(error, "m", "--error"),

@@ -212,16 +212,20 @@ def write_fit(path: Path, fit: Fit) -> None:
     """Keep a fit; nothing is kept if the place cannot be written."""
     centres, radii, quality = fit
     _, share, covered, rms, largest, errors, smallest = astuple(quality)
+    written: Path | None = None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         # Written to a temporary file and moved: another program never reads half a file.
         with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as part:
+            written = Path(part.name)
             np.savez(
                 part, centres=centres, radii=radii, fit=np.array([share, covered, rms, largest, *errors, smallest])
             )
-        Path(part.name).replace(path)
+        written.chmod(0o644)  # so that whoever shares the folder may read it
+        written.replace(path)
     except OSError:
-        return
+        if written is not None:
+            written.unlink(missing_ok=True)
 
 
 def _numbers(name: str, values: npt.ArrayLike) -> Array:
@@ -299,7 +303,11 @@ def _fewest_spheres(target: FitTarget, demand: Demand, diameter: float) -> Orbit
             break
         # deviation falls more slowly than count^(-4/3): far from the demand, a few more spheres do not help
         next_count = int(count * min(best_score / limit, 1.5) ** 0.75)
-    assert best is not None, "one row of one sphere is always among the layouts"
+    if best is None:
+        raise ShapeError(
+            f"too slender for the {demand.most_spheres} spheres of this resolution; allowed: thicker, or a number of "
+            "spheres"
+        )
     return best
 
 

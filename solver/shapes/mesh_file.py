@@ -58,6 +58,9 @@ def read_solid_mesh(file: str, unit: str = "m") -> trimesh.Trimesh:
         parts = [whole] if whole.is_watertight else parts
     for k, part in enumerate(parts, start=1):
         _check_closed(part, f"part {k} of {len(parts)}: " if len(parts) > 1 else "")
+    # A part of negative volume may be a cavity in another; the winding numbers tell.
+    if sum(float(part.volume) for part in parts) < 0.0:
+        raise MeshFileError("is inverted: its volume is not positive, normals must point outwards")
     mesh = _side_by_side(parts)
     _check_winding(mesh)
     return trimesh.Trimesh(mesh.vertices * LENGTH_UNITS[unit], mesh.faces, process=False)
@@ -110,7 +113,10 @@ def _welded(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     order = np.argsort(first)
     faces = np.argsort(order)[corner.ravel()][mesh.faces]
     a, b, c = faces.T
-    return trimesh.Trimesh(mesh.vertices[first[order]], faces[(a != b) & (b != c) & (c != a)], process=False)
+    welded = trimesh.Trimesh(mesh.vertices[first[order]], faces[(a != b) & (b != c) & (c != a)], process=False)
+    if len(np.unique(welded.faces)) < len(welded.vertices):  # corners that no face has are no part of the solid
+        welded.remove_unreferenced_vertices()
+    return welded
 
 
 def _check_closed(mesh: trimesh.Trimesh, part: str) -> None:
@@ -128,8 +134,6 @@ def _check_closed(mesh: trimesh.Trimesh, part: str) -> None:
         raise MeshFileError(f"{part}is degenerate: it encloses no volume")
     if not mesh.is_winding_consistent:
         raise MeshFileError(f"{part}is not consistent: neighbouring faces disagree about which side is outside")
-    if volume < 0.0:
-        raise MeshFileError(f"{part}is inverted: its volume is not positive, normals must point outwards")
 
 
 def _edge_fault(edges: npt.NDArray[np.int64]) -> str:
@@ -154,4 +158,7 @@ def _check_winding(mesh: trimesh.Trimesh) -> None:
     bad &= winding[-1] == 0.0
     if bad.any(axis=0).sum() >= FEWEST_BAD_RAYS:
         share = bad.sum() / (winding[:-1] > 0.5).sum()
-        raise MeshFileError(f"cuts through itself, or its parts overlap, in about {100 * share:.2g} % of its volume")
+        fault = "cuts through itself, or its parts overlap"
+        if (winding[:-1] < -0.5)[bad].any():
+            fault = "is inside out, or cuts through itself"
+        raise MeshFileError(f"{fault}, in about {100 * share:.2g} % of its volume")

@@ -27,7 +27,7 @@ def lattice_axes(mesh: trimesh.Trimesh, cells: float, volume: float) -> list[Arr
     return [a + (b - a) * (np.arange(n) + 0.5) / n for a, b, n in zip(low, high, numbers, strict=True)]
 
 
-def winding_numbers(mesh: trimesh.Trimesh, axes: list[Array]) -> Array:
+def winding_numbers(mesh: trimesh.Trimesh, axes: list[Array]) -> npt.NDArray[np.int16]:
     """Winding number at the lattice points (nx, ny, nz) and, as the last of nx + 1 planes, behind the mesh.
 
     By signed crossings of rays along x: 1 inside a sound mesh, 0 outside, and 0 in the last plane unless rounding let
@@ -55,10 +55,11 @@ def winding_numbers(mesh: trimesh.Trimesh, axes: list[Array]) -> Array:
     depth = mesh.triangles[facet[hit], :, 0]
     v, w = v[hit], w[hit]
     crossing = depth[:, 0] + v * (depth[:, 1] - depth[:, 0]) + w * (depth[:, 2] - depth[:, 0])
-    steps = np.zeros((len(x) + 1, len(y), len(z)))
+    # two bytes a cell: a box around a curled fibre has a hundred million of them
+    steps = np.zeros((len(x) + 1, len(y), len(z)), dtype=np.int16)
     # a facet whose normal points to -x lets the ray in
-    np.add.at(steps, (np.searchsorted(x, crossing), iy[hit], iz[hit]), -np.sign(doubled[hit]))
-    return np.cumsum(steps, axis=0)
+    np.add.at(steps, (np.searchsorted(x, crossing), iy[hit], iz[hit]), -np.sign(doubled[hit]).astype(np.int16))
+    return np.cumsum(steps, axis=0, dtype=np.int16, out=steps)
 
 
 def _cross(a: Array, b: Array) -> Array:

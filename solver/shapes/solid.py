@@ -257,7 +257,11 @@ def _surface_mesh(solid: Solid, refinement: int, stamp: int) -> trimesh.Trimesh:
         return trimesh.creation.box(extents)
     if solid.kind == "cylinder":
         diameter, length = solid.dimensions
-        mesh = trimesh.creation.cylinder(diameter / 2.0, length, sections=8 * 2**refinement)
+        sides = 8 * 2**refinement
+        mesh = trimesh.creation.cylinder(diameter / 2.0, length, sections=sides)
+        if len(mesh.faces) < 4 * sides:  # trimesh leaves out faces below 0.01 mm²
+            mesh = trimesh.creation.cylinder(0.5, 1.0, sections=sides)
+            mesh.apply_scale((diameter, diameter, length))
         if cylinder_axis(solid) == 0:
             # even permutation z -> x keeps the frame right-handed
             mesh.vertices = mesh.vertices[:, [2, 0, 1]]

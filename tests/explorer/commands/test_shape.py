@@ -169,3 +169,11 @@ def test_a_body_may_have_a_name_of_any_letters(tmp_path):
     assert result.exit_code == 0, result.output
     (body,) = tomllib.loads(out.read_text(encoding="utf-8"))["body"]
     assert (body["name"], body["mesh"]) == ("😀", "😀.stl")
+
+
+def test_the_name_of_a_file_with_blanks_and_dots_is_made_one_of_a_body(tmp_path):
+    trimesh.creation.box((12.0, 8.0, 6.0)).export(tmp_path / "my grain.v2.stl")
+    result = explorer("shape", tmp_path / "my grain.v2.stl", "--spheres", 1, "--most", 1, "--out", tmp_path / "b.toml")
+    assert result.exit_code == 0, result.output
+    (body,) = tomllib.loads((tmp_path / "b.toml").read_text(encoding="utf-8"))["body"]
+    assert body["name"] == "my_grain_v2"

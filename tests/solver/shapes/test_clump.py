@@ -279,3 +279,15 @@ def test_bad_resolution_and_density_are_refused():
         fit_clump(SEED, 346.0, "medium")  # type: ignore[arg-type]
     with pytest.raises(ShapeError, match="density"):
         fit_clump(SEED, -1.0, "coarse")
+
+
+@pytest.mark.parametrize(
+    ("solid", "spheres"),
+    [(Solid("box", (10e-3, 10e-3, 1e-4)), "coarse"), (Solid("cylinder", (2e-4, 20e-3)), "coarse")],
+)
+def test_a_solid_too_slender_for_a_resolution_is_refused_in_one_line(solid, spheres, tmp_path, monkeypatch):
+    monkeypatch.setenv("REPOSE_CACHE", str(tmp_path))
+    with pytest.raises(
+        ShapeError, match=r"^[^\n]*too slender for the \d+ spheres of this resolution; allowed: thicker"
+    ):
+        fit_clump(solid, 346.0, spheres)

@@ -78,3 +78,16 @@ def test_without_a_folder_it_fits_every_time(tmp_path, monkeypatch):
     kept_fit(SEED, "coarse", fitter)
     kept_fit(SEED, "coarse", fitter)
     assert fitter.asked == 2
+
+
+def test_whoever_shares_the_folder_may_read_a_fit_and_half_a_fit_is_not_left(folder, monkeypatch):
+    kept_fit(SEED, "coarse", Fitter())
+    (path,) = folder.rglob("*.npz")
+    assert path.stat().st_mode & 0o044 == 0o044
+
+    def full(*_, **__):
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(np, "savez", full)
+    kept_fit(SEED, "standard", Fitter())
+    assert [one for one in folder.rglob("*") if one.is_file()] == [path]

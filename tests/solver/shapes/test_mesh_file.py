@@ -90,6 +90,29 @@ def test_a_cavity_is_hollow(tmp_path):
     assert properties(saved(shell, tmp_path / "shell.stl")).volume == pytest.approx((1440 - 180) * 1e-9, rel=1e-6)
 
 
+@pytest.mark.parametrize("suffix", ["glb", "stl"])
+def test_a_cavity_may_be_a_part_of_its_own(suffix, tmp_path):
+    inner = inverted(trimesh.creation.box((10, 6, 3)))
+    path = saved(trimesh.Scene([trimesh.creation.box(BOX), inner]), tmp_path / f"hollow.{suffix}")
+    assert properties(path).volume == pytest.approx((1440 - 180) * 1e-9, rel=1e-6)
+
+
+def test_a_part_inside_out_beside_another_is_refused(tmp_path):
+    other = inverted(trimesh.creation.box((4, 4, 4)))
+    other.apply_translation([30, 0, 0])
+    path = saved(trimesh.Scene([trimesh.creation.box(BOX), other]), tmp_path / "two.glb")
+    with pytest.raises(MeshFileError, match="is inside out, or cuts through itself"):
+        read_solid_mesh(str(path), "mm")
+
+
+def test_corners_of_no_face_are_no_part_of_the_solid(tmp_path):
+    box = trimesh.creation.box(BOX)
+    stray = trimesh.Trimesh(np.vstack([box.vertices, [[100.0, 100.0, 100.0]]]), box.faces, process=False)
+    mesh = read_solid_mesh(str(saved(stray, tmp_path / "stray.ply")), "mm")
+    assert len(mesh.vertices) == 8
+    assert mesh.volume == pytest.approx(1440e-9, rel=1e-6)
+
+
 def test_repeated_corners_and_facets_without_area_do_no_harm(tmp_path):
     """A facet with a repeated corner, as exporters leave them, is no hole."""
     box = trimesh.creation.box(BOX)
@@ -147,7 +170,7 @@ FAULTS = {
     "fin": (finned(trimesh.creation.box(BOX)), "1 edges belong to more than two faces"),
     "point": (trimesh.Trimesh([[1, 1, 1]] * 3, [[0, 1, 2]], process=False), "degenerate: it has no face with an area"),
     "crossing": (crossed_boxes(), "cuts through itself, or its parts overlap"),
-    "pocket": (inside_out_pocket(), "cuts through itself, or its parts overlap"),
+    "pocket": (inside_out_pocket(), "is inside out, or cuts through itself"),
     "knot": (bent_rod(bend=4.0, radius=3.0, angle=2.2 * math.pi), "cuts through itself"),
     "nan": (trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, np.nan, 1]], [[0, 1, 2]], process=False), "not finite"),
 }

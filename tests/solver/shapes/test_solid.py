@@ -34,6 +34,18 @@ def test_closed_forms_agree_with_a_fine_mesh(solid):
     assert properties.volume == pytest.approx(properties.mass / 700.0)
 
 
+@pytest.mark.parametrize("dimensions", [(2e-4, 3e-3), (1.2e-3, 1.2e-3), (1.5e-3, 6e-3), (1e-2, 1e-4), (5e-4, 3e-4)])
+def test_the_mesh_of_a_small_cylinder_has_all_its_faces(dimensions):
+    for refinement in (2, 5):
+        mesh = surface_mesh(Solid("cylinder", dimensions), refinement=refinement)
+        sides = 8 * 2**refinement
+        assert mesh.is_watertight
+        # An n-sided prism has the share n/2π sin 2π/n of its cylinder's volume.
+        share = sides / (2.0 * math.pi) * math.sin(2.0 * math.pi / sides)
+        assert mesh.volume == pytest.approx(share * math.pi / 4.0 * dimensions[0] ** 2 * dimensions[1], rel=1e-9)
+        assert sorted(mesh.extents) == pytest.approx(sorted((dimensions[0], *dimensions)))
+
+
 def test_closed_forms_by_hand():
     # a sphere of 6 mm and 1000 kg/m3: m = pi/6 d^3 rho, I = m d^2 / 10
     mass = math.pi / 6 * 6e-3**3 * 1000.0
