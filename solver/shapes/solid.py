@@ -145,13 +145,8 @@ def mass_properties(solid: Solid, density: float) -> MassProperties:
     if not _is_length(density):
         raise ShapeError(f"density = {density!r}: must be a positive, finite number [kg/m3]")
     if solid.kind == "mesh":
-        mesh = surface_mesh(solid)
-        return MassProperties(
-            density * mesh.volume,
-            density * np.diag(mesh.moment_inertia),
-            mesh.volume,
-            np.asarray(mesh.extents),
-        )
+        whole, moments, size = _integrals(solid, file_stamp(solid))
+        return MassProperties(density * whole, density * np.array(moments), whole, np.array(size))
     extents = principal_extents(solid)
     squares = extents**2
     box_volume = float(np.prod(extents))
@@ -166,6 +161,13 @@ def mass_properties(solid: Solid, density: float) -> MassProperties:
         volume, second = math.pi / 6.0 * box_volume, squares / 20.0
     mass = density * volume
     return MassProperties(mass, mass * (second.sum() - second), volume, extents)
+
+
+@lru_cache(maxsize=64)
+def _integrals(solid: Solid, stamp: int) -> tuple[float, tuple[float, ...], tuple[float, ...]]:
+    """Volume, principal moments at unit density and outer dimensions of a mesh: asked for at every body that enters."""
+    mesh = _surface_mesh(solid, 2, stamp)
+    return float(mesh.volume), tuple(np.diag(mesh.moment_inertia).tolist()), tuple(mesh.extents.tolist())
 
 
 def principal_extents(solid: Solid) -> Array:
