@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -202,6 +202,8 @@ class Study:
     """Stage of another package → its table."""
     experiments: dict[str, Scene] = field(default_factory=dict)
     """Name → scene of each further experiment with the same material."""
+    replaced: tuple[str, ...] = ()
+    """A line on each parameter whose reference differs from the material file or the set-up."""
 
     @property
     def all_experiments(self) -> tuple[str, ...]:
@@ -221,8 +223,8 @@ class LevelsTable(TomlTable):
     """Path of the varied parameter."""
     low: Annotated[float | str, Scalar()]
     high: Annotated[float | str, Scalar()]
-    reference: Annotated[float | str, Scalar()]
-    """The measured value, within low … high."""
+    reference: Annotated[float | str, Scalar()] | None = None
+    """Best guess, within low … high; by default the value in the material file or the set-up."""
 
 
 class ChangeTable(TomlTable):
@@ -379,6 +381,7 @@ def study_from(table: Settings, path: Path) -> Study:
     _refuse_twins([*factors, *assumptions])
     for together in (factors, assumptions):
         _require_room(together, [body.name for body in scene.bodies])
+    replaced = tuple(_replaced(scene, file.material, table, (*factors, *assumptions)))
     scene = with_values(scene, {one.path: one.reference for one in (*factors, *assumptions)})
     beside = main_effect_design(file.assumptions, "assumptions", "assumption", ASSUMPTIONS, assumptions, None)
     _require_rows(scene, factors, screening, "screening")
@@ -435,7 +438,25 @@ def study_from(table: Settings, path: Path) -> Study:
         surface_design=second_order_design(file.surface, "surface", SURFACE, CALIBRATED),
         further=_further(file.stage),
         experiments=experiments,
+        replaced=replaced,
     )
+
+
+def _replaced(scene: Scene, material: str, table: Settings, factors: Sequence[Factor]) -> Iterator[str]:
+    """Lines for :attr:`Study.replaced`; ``scene`` has the values of the material file and the set-up."""
+    for one in factors:
+        stated = value(scene, one.path)
+        if one.path == "body.spheres" or _same(stated, one.reference):  # the profile chooses the shapes
+            continue
+        kind = one.path.partition(".")[0]
+        where = f"[{kind}]" if one.path.removeprefix(f"{kind}.") in table.get(kind, {}) else material
+        shown = [f"{number:.6g}" if isinstance(number, float) else number for number in (one.reference, stated)]
+        yield f"{one.path}: {shown[0]}, the reference of {one.name}, counts instead of {shown[1]} in {where}"
+
+
+def _same(a: float | str, b: float | str) -> bool:
+    """Whether two values are the same to the six digits that files are written with."""
+    return a == b if isinstance(a, str) or isinstance(b, str) else math.isclose(a, b, rel_tol=1e-5)
 
 
 def _require_possible(target: Target) -> None:
@@ -487,7 +508,8 @@ def _further(tables: dict[str, Settings]) -> dict[str, Settings]:
 
 
 def _levels(scene: Scene, entry: LevelsTable) -> Factor:
-    return Factor(entry.name, *checked_levels(scene, entry.name, entry.path, (entry.low, entry.high, entry.reference)))
+    reference = value(scene, canonical(scene, entry.path)) if entry.reference is None else entry.reference
+    return Factor(entry.name, *checked_levels(scene, entry.name, entry.path, (entry.low, entry.high, reference)))
 
 
 def _factor(scene: Scene, entry: LevelsTable) -> Factor:

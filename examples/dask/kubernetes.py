@@ -12,6 +12,7 @@ import subprocess
 from dask_kubernetes.operator import KubeCluster
 
 IMAGE = "registry.example.org/repose-explorer:0.1.0"
+STUDY = "sunflower_extract"  # or a file of yours: lentil_study.toml
 WORKERS = 100
 COMMAND = ["dask", "worker", "--nthreads", "1"]
 
@@ -20,5 +21,5 @@ if __name__ == "__main__":
     with KubeCluster(
         name="repose", image=IMAGE, n_workers=WORKERS, resources=one_core, worker_command=COMMAND
     ) as cluster:
-        command = ["explorer", "calibrate", "--headless", "--profile", "quick", "--out", "results/kubernetes"]
+        command = ["explorer", "calibrate", "--headless", "--study", STUDY, "--profile", "quick", "--out", "results/kubernetes"]
         subprocess.run([*command, "--scheduler", cluster.scheduler_address], check=True)

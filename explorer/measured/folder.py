@@ -185,12 +185,13 @@ def _set(scene: Scene, asked: NewCondition) -> Scene:
 
 
 def _of_study(file: Path) -> tuple[dict[str, Any], list[str]]:
-    """[parameters] from the factors of a study, and a line on those that no data set can leave open."""
+    """[parameters] from the factors of a study; lines on those that no data set can leave open, and on references."""
     study = load_study(str(file))
     open_ = [f for f in study.factors if f.path.startswith(tuple(f"{kind}." for kind in FREE))]
     free = {f.path: {"low": float(f.low), "high": float(f.high)} for f in open_ if not isinstance(f.low, str)}
     shut = [f.path for f in study.factors if f.path not in free]
-    return free, [f"not among [parameters], as a condition states them: {', '.join(shut)}"] if shut else []
+    left_out = [f"not among [parameters], as a condition states them: {', '.join(shut)}"] if shut else []
+    return free, [*left_out, *study.replaced]
 
 
 def _starter_ranges(scene: Scene, material: str) -> dict[str, Any]:

@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 
 from explorer.errors import CommandError
 from explorer.scene.file import load_scene, material_scene
-from solver import Parameter, Scene, is_material, parameters, read_toml, value
+from solver import Parameter, Scene, is_material, observable_names, parameters, read_toml, value
 from solver.assets import own_path, shipped_assets
-from solver.rigs.lifting_cylinder import LiftingCylinder
+from solver.rigs import RIGS
+from solver.rigs.funnel import Funnel
 from solver.scenes.material_file import scene_from
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
@@ -22,8 +24,19 @@ STUDY_ENDING = "_study"
 SPAN = 0.2
 """Half the width of a factor's range, as a fraction of its reference."""
 MOST_FACTORS = 8
-CUT = "\n#---\n"
-"""Separates the parts of a study template that depend on its rig."""
+MEANS = {"funnel": 17.0}
+"""Rig → mean of the example target [°], which the starter material reaches there; 25° elsewhere."""
+UNWRITTEN: dict[str, tuple[str, float, float, float]] = {
+    "rig.outlet_height": ("outlet_height", 0.85, 1.15, 1.25),
+    "rig.lift_speed": ("lift_speed", 0.5, 2.0, 3.0),
+    "rig.slot_width": ("slot_width", 0.9, 1.1, 1.2),
+    "rig.speed_rpm": ("speed_rpm", 0.8, 1.2, 1.5),
+    "rig.filled_volume": ("filled_volume", 0.9, 1.1, 1.2),
+    "insertion.rate": ("feed_rate", 0.5, 2.0, 3.0),
+    "insertion.drop_speed": ("drop_speed", 0.5, 2.0, 3.0),
+}
+"""What nobody writes down about a set-up: path → name; low, high and a declared change, as multiples of the value."""
+MOST_UNWRITTEN = 3
 
 
 def write_material(folder: Path, name: str) -> Path:
@@ -71,9 +84,9 @@ def starter_scene(path: Path) -> Scene:
 
 
 def study_scene(material: str) -> Scene:
-    """The scene of a new study of ``material``: its own rig if that is a lifted cylinder, otherwise the funnel."""
+    """The scene of a new study of ``material``: in its own rig if that pours, otherwise through the funnel."""
     own = material_scene(material)
-    return own if isinstance(own.rig, LiftingCylinder) else load_scene("funnel", material)
+    return own if own.rig.name in RIGS else load_scene("funnel", material)
 
 
 def study_text(path: Path, material: str, scene: Scene) -> str:
@@ -89,26 +102,47 @@ def study_text(path: Path, material: str, scene: Scene) -> str:
         FILE=path.name,
         MATERIAL=material,
         FACTORS=factors,
-        **_rig_words(scene),
+        SET_UP=_set_up_text(scene),
+        OBSERVABLE=observable_names(scene)[0],
+        MEAN=f"{MEANS.get(scene.rig.name, 25.0):.1f}",
+        **_unwritten_texts(scene),
     )
 
 
-def _rig_words(scene: Scene) -> dict[str, str]:
-    """Texts of a study that depend on its rig: set-up, assumptions, declared change and scan, poured masses [kg]."""
-    words = {"QUICK_MASS": "0.012", "MASS": "0.030"}
-    template = "study_in_funnel.toml"
-    if isinstance(scene.rig, LiftingCylinder):
-        # A cylinder that holds too little for a heap leaves a flat layer: every profile pours all of it.
-        words = dict.fromkeys(words, f"{scene.rig.mass:g}")
-        template = "study_in_cylinder.toml"
-    numbers = {"RIG": scene.rig.name} | {
-        f"{word}{path.split('.')[1].upper()}": f"{share * float(value(scene, path)):.6g}"
-        for path in ("insertion.rate", "insertion.drop_speed", "rig.lift_speed")
-        if path in parameters(scene)
-        for word, share in (("HALF_", 0.5), ("", 1.0), ("TWICE_", 2.0))
+def _set_up_text(scene: Scene) -> str:
+    """The tables of the set-up: the funnel with all its numbers; any other rig is that of the material file."""
+    template = "study_in_funnel.toml" if isinstance(scene.rig, Funnel) else "study_in_own_rig.toml"
+    numbers = {
+        path.upper(): one if isinstance(one, str) else f"{float(one):.6g}"
+        for path in parameters(scene)
+        if path.startswith(("rig.", "insertion."))
+        for one in [value(scene, path)]
     }
-    parts = _filled(template, **numbers).rstrip("\n").split(CUT)
-    return words | dict(zip(("SET_UP", "SCREENED", "CHANGED"), parts, strict=True))
+    return _filled(template, **numbers, **{"RIG.NAME": scene.rig.name}).rstrip("\n")
+
+
+def _unwritten_texts(scene: Scene) -> dict[str, str]:
+    """Assumptions about the set-up; the first of them makes the declared change and the scan."""
+    found = [path for path in UNWRITTEN if path in parameters(scene) and float(value(scene, path)) > 0.0]
+    tables = []
+    for path in found[:MOST_UNWRITTEN]:
+        name, *shares = UNWRITTEN[path]
+        low, high, _ = _multiples(scene, path, shares)
+        unit = parameters(scene)[path].unit
+        tables.append(f'[[assumption]]\nname = "{name}"\npath = "{path}"   # [{unit}]\nlow = {low}\nhigh = {high}')
+    path = found[0]
+    name, *shares = UNWRITTEN[path]
+    scanned, unit = _multiples(scene, path, shares), parameters(scene)[path].unit
+    change = f'[[change]]\nname = "{name} of {scanned[-1]} {unit}"\nvalues = {{ "{path}" = {scanned[-1]} }}'
+    scan = f'[scan]\npath = "{path}"\nvalues = [{", ".join(scanned)}]   # [{unit}]'
+    return {
+        "SCREENED": "\n\n".join(tables),
+        "CHANGED": f"{change}\n\n# The angle over one assumption, in steps.\n\n{scan}",
+    }
+
+
+def _multiples(scene: Scene, path: str, shares: Sequence[float]) -> list[str]:
+    return [f"{share * float(value(scene, path)):.6g}" for share in shares]
 
 
 def factor_paths(scene: Scene) -> list[str]:
@@ -130,7 +164,7 @@ def _factor_text(name: str, reference: float, entry: Parameter) -> str:
     unit = "" if entry.unit == "1" else f"   # [{entry.unit}]"
     return (
         f'\n[[factor]]\nname = "{name}"\npath = "{entry.path}"   # {entry.doc}\n'
-        f"low = {low:.6g}{unit}\nhigh = {high:.6g}\nreference = {reference:.6g}\n"
+        f"low = {low:.6g}{unit}\nhigh = {high:.6g}\n"
     )
 
 

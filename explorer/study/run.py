@@ -146,6 +146,8 @@ def _run(
         photographed.copied(order.out / FOLDER)
         say(f"target: {photographed.line}")
     grams = "" if profile.mass is None else f" of {1e3 * profile.mass:g} g"
+    for line in study.replaced:
+        say(f"note: {line}")
     say(f"{study.name}, profile {profile.name}: {sum(planned.values())} runs{grams}; store {path}")
     if not order.scheduler:  # how many cores those workers have is not known beforehand
         say(duration_text(study, profile, path, order.threads))

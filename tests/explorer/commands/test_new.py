@@ -9,7 +9,7 @@ import trimesh
 from doe.studies.study import load_study
 from explorer.scene.file import load_scene
 from explorer.scene.starter_files import study_text
-from solver import load_material, value
+from solver import RIGS, load_material, observable_names, value
 from solver.assets import asset_path, shipped_assets
 from tests.explorer.command_line import TINY, explorer, refused, settings
 
@@ -118,6 +118,44 @@ def test_a_material_of_one_s_own_starts_as_any_shipped_one(material, tmp_path):
     # and keeps where the numbers come from
     shipped = tomllib.loads(asset_path("materials", material).read_text(encoding="utf-8"))
     assert tomllib.loads(path.read_text(encoding="utf-8")).get("measured") == shipped.get("measured")
+
+
+@pytest.mark.parametrize("rig", RIGS)
+def test_a_study_is_of_the_rig_in_its_material_file(rig, tmp_path):
+    assert explorer("new", "material", "own", "--out", tmp_path).exit_code == 0
+    path = tmp_path / "own.toml"
+    path.write_text(path.read_text() + f'\n[rig]\nname = "{rig}"\n\n[insertion]\ndrop_speed = 0.4\n')
+    assert explorer("new", "study", "own", "--out", tmp_path).exit_code == 0
+    study = load_study(str(tmp_path / "own_study.toml"))
+    assert study.scene.rig.name == rig
+    assert value(study.scene, "insertion.drop_speed") == 0.4
+    assert study.targets[0].observable in observable_names(study.scene)
+    # No profile pours another mass than the rig states, and no reference repeats what is stated elsewhere.
+    assert {profile.mass for profile in study.profiles.values()} == {None}
+    assert study.replaced == ()
+
+
+def test_a_study_follows_its_material_until_it_states_a_reference(tmp_path):
+    assert explorer("new", "study", "own", "--out", tmp_path).exit_code == 0
+    material, file = tmp_path / "own.toml", tmp_path / "own_study.toml"
+    material.write_text(material.read_text().replace("static_friction = 0.60", "static_friction = 0.55"))
+    file.write_text(file.read_text().replace("outlet_height = 0.065 ", "outlet_height = 0.070 "))
+    study = load_study(str(file))
+    assert value(study.scene, "pair.grain.grain.static_friction") == study.factors[0].reference == 0.55
+    assert value(study.scene, "rig.outlet_height") == study.assumptions[0].reference == 0.070
+    text = file.read_text()
+    for end in ("high = 0.72\n", "high = 0.07475\n"):
+        text = text.replace(end, f"{end}reference = 0.06\n" if "0.07" in end else f"{end}reference = 0.65\n")
+    file.write_text(text)
+    assert load_study(str(file)).replaced == (
+        "pair.grain.grain.static_friction: 0.65, the reference of X1, counts instead of 0.55 in own.toml",
+        "rig.outlet_height: 0.06, the reference of outlet_height, counts instead of 0.07 in [rig]",
+    )
+    # Left out, it must lie within the range as well.
+    material.write_text(material.read_text().replace("static_friction = 0.55", "static_friction = 0.80"))
+    file.write_text(file.read_text().replace("reference = 0.65\n", ""))
+    line = refused(explorer("calibrate", "--headless", "--study", file, "--out", tmp_path / "out"))
+    assert "X1 (pair.grain.grain.static_friction): reference 0.8 is outside 0.48 … 0.72" in line
 
 
 def test_template_has_no_blank_left(tmp_path):
