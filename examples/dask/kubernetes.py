@@ -21,5 +21,15 @@ if __name__ == "__main__":
     with KubeCluster(
         name="repose", image=IMAGE, n_workers=WORKERS, resources=one_core, worker_command=COMMAND
     ) as cluster:
-        command = ["explorer", "calibrate", "--headless", "--study", STUDY, "--profile", "quick", "--out", "results/kubernetes"]
+        command = [
+            "explorer",
+            "calibrate",
+            "--headless",
+            "--study",
+            STUDY,
+            "--profile",
+            "quick",
+            "--out",
+            "results/kubernetes",
+        ]
         subprocess.run([*command, "--scheduler", cluster.scheduler_address], check=True)

@@ -75,7 +75,7 @@ def guarded_server(
     """
     check_token(host, token)
     port = free_port(host, port)
-    hosts = allowed_hosts(host, port)
+    hosts, named = allowed_hosts(host, port), [f"{address(host)}:{port}"]
     origins: Any = [f"http://{name}" for name in hosts]
     real_serve = websockets.asyncio.server.serve
     incoming = Incoming()
@@ -87,7 +87,7 @@ def guarded_server(
             else:
                 await incoming.handle(connection, handler)
 
-        options["process_request"] = _for_hosts(hosts, token, pages, options["process_request"])
+        options["process_request"] = _for_hosts(hosts, named, token, pages, options["process_request"])
         options |= {"max_size": MOST_MESSAGE_BYTES, "max_queue": MOST_QUEUED, "logger": _quiet_logger()}
         options |= {"ping_interval": ASK_AFTER, "ping_timeout": GIVE_UP_AFTER, "close_timeout": CUT_AFTER}
         return real_serve(
@@ -104,7 +104,7 @@ def guarded_server(
     if server.get_port() != port:
         server.stop()
         raise PortError(f"port {port} on {host} is busy; choose another one, or 0 for any free port")
-    server.token = token
+    server.token, server._named = token, named
     for share in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
         server._websock_server.unregister_handler(share)
     incoming.serve(server)
@@ -115,6 +115,13 @@ class GuardedServer(viser.ViserServer):
     """viser's server behind the guard; ``token``: token that a browser has to show, None for none."""
 
     token: str | None = None
+    _named: list[str]
+    """The name (``name:port``) by which the latest browser has come."""
+
+    def address(self, port: int | None = None) -> str:
+        """Address for links to this server, or to another ``port``, under the name that the latest browser asked for."""
+        own = self.get_port()
+        return f"http://{self._named[0].removesuffix(f':{own}')}:{own if port is None else port}"
 
 
 class BoundedConnection(websockets.asyncio.server.ServerConnection):
@@ -178,10 +185,11 @@ def address(host: str) -> str:
 
 
 def _for_hosts(
-    hosts: Sequence[str], token: str | None, pages: WebPages | None, answer: Any
+    hosts: Sequence[str], latest: list[str], token: str | None, pages: WebPages | None, answer: Any
 ) -> Callable[[Any, Any], Any]:
     """The answer of ``pages``, or viser's ``answer`` (to an HTTP request or the opening of a WebSocket), for ``hosts``
-    and those who know the ``token``; 421 for other hosts, 401 and a form for those without a token."""
+    and those who know the ``token``; 421 for other hosts, 401 and a form for those without a token. ``latest`` is
+    changed to the name that was asked for last."""
 
     def process_request(connection: Any, request: Any) -> Any:
         named = [name.lower() for name in request.headers.get_all("Host")]
@@ -189,6 +197,7 @@ def _for_hosts(
             return connection.respond(HTTPStatus.MISDIRECTED_REQUEST, "This server has another name.\n")
         if token is not None and not has_cookie(request.headers.get_all("Cookie"), *token_cookie(token)):
             return _login_response(connection, request, token)
+        latest[0] = named[0]
         if "Upgrade" in request.headers and len(connection.server.connections) >= MOST_SOCKETS:
             return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "Too many browsers are at this page.\n")
         own = None if pages is None else pages.answer(request)

@@ -16,7 +16,7 @@ from explorer.live.frames import Frame
 from explorer.scene.link import INSTEAD, LONGEST
 from explorer.units import InputError
 from explorer.viewer.actions import ClientAction, Post, add_client_key, client_buttons
-from explorer.viewer.guarded_server import address
+from explorer.viewer.guarded_server import GuardedServer
 from explorer.viewer.view import VIEW_DIRECTION, VIEW_FIELD, CameraView, view_from
 
 Array = npt.NDArray[np.float64]
@@ -54,7 +54,7 @@ class CameraPanel:
 
     def __init__(
         self,
-        server: viser.ViserServer,
+        server: GuardedServer,
         post: Post,
         height: Callable[[], float],
         pile: Callable[[], Array],
@@ -104,7 +104,7 @@ class CameraPanel:
         go_to_place(client, framing(points, camera.position - camera.look_at, camera.fov, aspect_of(camera)))
 
     def _show_link(self, client: Any) -> None:
-        self._link.value = view = link_to(self._server, client.camera)
+        self._link.value = view = link_to(self._server.address(), client.camera)
         try:
             pour = self._pour()
         except CommandError as error:
@@ -177,8 +177,8 @@ def go_to_place(client: Any, view: CameraView) -> None:
         client.camera.look_at = view.look_at
 
 
-def link_to(server: viser.ViserServer, camera: Any) -> str:
-    """Address of the page that opens with the view of ``camera``."""
+def link_to(address: str, camera: Any) -> str:
+    """Address of the page at ``address`` that opens with the view of ``camera``."""
     numbers = {
         "initialCameraPosition": camera.position,
         "initialCameraLookAt": camera.look_at,
@@ -189,4 +189,4 @@ def link_to(server: viser.ViserServer, camera: Any) -> str:
     query = "&".join(
         f"{name}={','.join(f'{round(float(x), 4) + 0.0:g}' for x in values)}" for name, values in numbers.items()
     )
-    return f"http://{address(server.get_host())}:{server.get_port()}/?{query}"
+    return f"{address}/?{query}"

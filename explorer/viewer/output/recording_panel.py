@@ -17,7 +17,7 @@ import viser
 from explorer.errors import CommandError
 from explorer.files.exports import zipped
 from explorer.recordings.recording import recorded_lines
-from explorer.viewer.guarded_server import address, guarded_server
+from explorer.viewer.guarded_server import GuardedServer, guarded_server
 from explorer.viewer.output.recording_switch import HTML, RRD, RecordingSwitch
 from explorer.viewer.output.send_file import refuse_large, send_file
 from explorer.viewer.panel import EXPORT, Now, PageContext, Panel
@@ -84,7 +84,7 @@ class RecordingPanel(Panel):
                 raise CommandError("recording: a web page replays itself; download and open it")
             self._background.start(
                 "reading the recording",
-                lambda: replays_beside(pours, self._server.get_host(), self._server.token),
+                lambda: replays_beside(pours, self._server),
                 self._show_replays,
             )
         elif chosen == DOWNLOAD and client is not None:
@@ -107,21 +107,21 @@ class RecordingPanel(Panel):
 
 
 class ReplayBeside:
-    """Serves ``recording`` on a free port of ``host`` until it is closed; plays when the first browser comes.
+    """Serves ``recording`` on a free port until it is closed; plays when the first browser comes.
 
-    ``token``: that of the live page.
+    ``live``: server of the live page, whose host and token are this one's.
 
     Raises :class:`explorer.errors.CommandError` if the recording cannot be read.
     """
 
-    def __init__(self, recording: Path, host: str, token: str | None) -> None:
+    def __init__(self, recording: Path, live: GuardedServer) -> None:
         # Imported here: rerun takes a second to load, and most sessions are never replayed.
         from explorer.recordings.recording_reader import read_recording
         from explorer.viewer.replay.replay_page import ReplayPage
 
         read = read_recording(recording)
         self._server, self._stop = (
-            guarded_server(host, 0, "Replay", WebPages("Replay", around=False), token=token),
+            guarded_server(live.get_host(), 0, "Replay", WebPages("Replay", around=False), token=live.token),
             threading.Event(),
         )
         try:
@@ -129,7 +129,7 @@ class ReplayBeside:
         except BaseException:
             self._server.stop()
             raise
-        self.address = f"http://{address(host)}:{self._server.get_port()}"
+        self.address = live.address(self._server.get_port())
         self.seconds = float(read.times[-1]) - read.zero
         """Duration of the recording [s]."""
         self._loop = threading.Thread(target=page.run, args=(self._stop,), daemon=True, name="explorer-replay")
@@ -142,12 +142,12 @@ class ReplayBeside:
         self._server.stop()
 
 
-def replays_beside(recordings: Sequence[Path], host: str, token: str | None) -> list[ReplayBeside]:
+def replays_beside(recordings: Sequence[Path], live: GuardedServer) -> list[ReplayBeside]:
     """One replay for each of ``recordings``; none is left open if one of them cannot be read."""
     with ExitStack() as stack:
         replays = []
         for path in recordings:
-            replays.append(ReplayBeside(path, host, token))
+            replays.append(ReplayBeside(path, live))
             stack.callback(replays[-1].close)
         stack.pop_all()
     return replays

@@ -25,6 +25,7 @@ from explorer.recordings.recording import SAME_TIME, RecordedSurface, Recording
 from explorer.scene.meshes import GATE_NAME, PLATE_NAME, outlet_height, scene_height
 from explorer.units import checked
 from explorer.viewer.actions import Action, Actions, FrameClock, Post, add_keys, button_group
+from explorer.viewer.guarded_server import GuardedServer
 from explorer.viewer.look.camera import CameraPanel, pile_points
 from explorer.viewer.look.colour_by import ColourPanel
 from explorer.viewer.look.drawn_look import DrawnLook, DrawnNodes
@@ -71,7 +72,7 @@ CURVES = (
 class ReplayPage:
     """What a browser sees of ``recording``."""
 
-    def __init__(self, server: viser.ViserServer, recording: Recording, name: str) -> None:
+    def __init__(self, server: GuardedServer, recording: Recording, name: str) -> None:
         zero = recording.zero
         recording = recording.counted_from(zero)
         self._server, self._recording = server, recording

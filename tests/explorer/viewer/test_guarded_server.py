@@ -123,6 +123,14 @@ def test_the_page_is_served_under_its_own_names_only(server, hosts, expected):
     assert page_status(port, [host.format(port=port) for host in hosts]) == expected
 
 
+def test_links_are_under_the_name_by_which_a_browser_came(server):
+    port = server.get_port()
+    for host, expected in (("LocalHost:{port}", "localhost"), ("[::1]:{port}", "[::1]"), ("evil.example", "[::1]")):
+        page_status(port, [host.format(port=port)])
+        assert server.address() == f"http://{expected}:{port}"
+        assert server.address(9999) == f"http://{expected}:9999"
+
+
 def test_a_rebound_name_cannot_open_a_socket(server):
     """DNS rebinding: the foreign name means 127.0.0.1 by now, so the page's requests reach the server under it."""
     port = server.get_port()
