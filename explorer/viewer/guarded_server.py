@@ -119,7 +119,7 @@ class GuardedServer(viser.ViserServer):
     """The name (``name:port``) by which the latest browser has come."""
 
     def address(self, port: int | None = None) -> str:
-        """Address for links to this server, or to another ``port``, under the name that the latest browser asked for."""
+        """Address for links to this server or another ``port``, under the name that the latest browser asked for."""
         own = self.get_port()
         return f"http://{self._named[0].removesuffix(f':{own}')}:{own if port is None else port}"
 
