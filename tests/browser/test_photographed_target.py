@@ -103,7 +103,7 @@ def test_a_photograph_is_made_the_target_until_it_is_removed(browser, project):
         page.wait_for_function(ENABLED, arg="Remove the target")
         # By key: what is loaded above it may push it away from under the pointer.
         remove.press("Enter")
-        page.locator("#state-line").get_by_text("25.00° ± 2.00°").wait_for()
+        page.locator("#state-line").get_by_text("17.00° ± 2.00°").wait_for()
         room(page, "Calibrate")
         seen(page, "From the study's file")
         shot(page, "removed")

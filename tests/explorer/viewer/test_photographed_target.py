@@ -92,8 +92,8 @@ def folder(tmp_path):
 
 def test_what_was_read_becomes_the_target_and_is_there_after_a_restart(server, folder):
     page = ProjectPage(server, folder)
-    assert (page.measured["state"], page.measured["said"]) == ("assumed", "25.00° ± 2.00°")
-    assert "25.00° ± 2.00° SD \\(assumed, n = 10\\)" in page.calibrate.text
+    assert (page.measured["state"], page.measured["said"]) == ("assumed", "17.00° ± 2.00°")
+    assert "17.00° ± 2.00° SD \\(assumed, n = 10\\)" in page.calibrate.text
     assert page.disabled == [True, True, True]
     assert page.read(picture(27.0)) == ""
     assert page.disabled == [False, True, True]

@@ -169,15 +169,12 @@ def _all_of(pour: Pour) -> Array:
     return np.concatenate([state, curves, surface, decided, pour.record().in_pile])
 
 
-def bench_numbers() -> Numbers:
-    """What the tests of a single body measure."""
-    results = {name: measure(with_rig(TREFOIL, name), 1) for name, measure in BENCH_TESTS.items()}
-    return {
-        f"bench, {name}": np.array(
-            [*(q.value for q in result.quantities), *(x for _, row in result.series for x in row)]
-        )
-        for name, result in results.items()
-    }
+def bench_numbers() -> tuple[Numbers, Numbers]:
+    """What the tests of a single body measure: quantities alone, and with the series that they are read off."""
+    results = {f"bench, {name}": measure(with_rig(TREFOIL, name), 1) for name, measure in BENCH_TESTS.items()}
+    quantities = {name: np.array([q.value for q in result.quantities]) for name, result in results.items()}
+    series = {name: [x for _, row in result.series for x in row] for name, result in results.items()}
+    return quantities, {name: np.array([*quantities[name], *series[name]]) for name in results}
 
 
 def shape_numbers(folder: Path) -> Numbers:
@@ -211,7 +208,7 @@ def defaults() -> dict[str, float | str]:
 
 
 def everything(folder: Path) -> tuple[Numbers, Numbers]:
-    """Early and late numbers of all cases; those without steps have late ones only. ``folder``: an empty one."""
+    """Early and late numbers of all cases; those of shapes have late ones only. ``folder``: an empty one."""
     plain, beside = {"heap, alone": TREFOIL}, {"heap, second of three": TREFOIL}
     moved = {f"heap with {_revised(name)}": with_effects(TREFOIL, felt(name)) for name in IN_KERNELS}
     moved |= {f"heap, {name}": with_values(TREFOIL, {f"contact.{key}": name}) for name, key in CONVENTIONS.items()}
@@ -230,10 +227,11 @@ def everything(folder: Path) -> tuple[Numbers, Numbers]:
         pour_numbers(meshes),
         *(heap_numbers({f"heap, {law}": with_values(TREFOIL, {"contact.law": law})}) for law in other_laws),
         *(pour_numbers({f"pour, funnel, {law}": with_values(funnel, {"contact.law": law})}) for law in other_laws),
+        bench_numbers(),
     ):
         early |= first
         late |= last
-    return early, late | bench_numbers() | shape_numbers(folder)
+    return early, late | shape_numbers(folder)
 
 
 def digests(late: Numbers) -> dict[str, str]:

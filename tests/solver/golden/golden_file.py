@@ -2,10 +2,12 @@
 
 ``golden.json``    physics, defaults of all parameters, and per kind of machine (instruction sets of the processor,
                    versions of Taichi and NumPy) the digest of every case; ``before``: the same of the physics before
-``first_steps.npz``  state of each case after its first steps, for machines whose bits are not known
+``first_steps.npz``  state of each case after its first steps, and results of each bench test, for machines whose bits
+                     are not known
 
 ``python -m tests.solver.golden.golden_file`` (``make golden``) records what is new. It refuses bits that changed under
-the same number of the physics, and a raised number under which nothing changed.
+the same number of the physics, and a raised number under which nothing changed. A bench test is recorded under the same
+number: nothing is stored of it, and how it measures is no physics.
 """
 
 import json
@@ -30,6 +32,11 @@ FIRST_STEPS = Path(__file__).with_name("first_steps.npz")
 TOLERANCE = 4e-12
 """On another processor. A change by one unit in the last place grows to 1e-12 rad/s of 5 rad/s over the first steps;
 by the series of the velocity-dependent damper to 1.2e-12 between two processors."""
+BENCH = "bench, "
+"""How the names of bench tests begin."""
+BENCH_TOLERANCE = 1e-5
+"""Of a bench test's results on another processor, relative: where rounding moves the step at which something begins, a
+quantity moves by a step's worth."""
 INSTRUCTION_SETS = re.compile(r"sse|ssse|avx|fma|f16c|bmi|popcnt|movbe|adx|amx|neon|asimd|sve")
 
 Digests = dict[str, str]
@@ -88,24 +95,29 @@ def changed(one: dict[str, Any], other: dict[str, Any]) -> list[str]:
 
 
 def apart(known: Numbers, now: Numbers) -> list[str]:
-    """Cases in both whose first steps differ by more than ``TOLERANCE``."""
+    """Cases in both whose first steps differ by more than ``TOLERANCE``, bench tests by ``BENCH_TOLERANCE``."""
     return [
         name
         for name in known
         if name in now
-        and (known[name].shape != now[name].shape or (np.abs(now[name] - known[name]) > _slack(known[name])).any())
+        and (
+            known[name].shape != now[name].shape or (np.abs(now[name] - known[name]) > _slack(name, known[name])).any()
+        )
     ]
 
 
-def _slack(state: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """``TOLERANCE`` of the largest value of each column, or of 1 SI unit if that is more."""
+def _slack(name: str, state: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """``TOLERANCE`` of the largest value of each column, or of 1 SI unit if that is more; see ``BENCH_TOLERANCE``."""
+    if name.startswith(BENCH):
+        return np.asarray(BENCH_TOLERANCE * np.abs(state))
     slack: npt.NDArray[np.float64] = TOLERANCE * np.maximum(1.0, np.abs(state).max(axis=0))
     return slack
 
 
 def contradiction(golden: Golden, now: Golden) -> str | None:
     """How a number and the bits of ``now``, taken on one machine, contradict each other; None: they do not."""
-    differing, what = _differing(golden, now)
+    found, what = _differing(golden, now)
+    differing = [name for name in found if not name.startswith(BENCH)]
     if golden.on(now.machines[0].machine) is None and now.physics > golden.physics:
         return None  # what changed may show after the first steps only, and its bits are not known here
     line = at_odds("PHYSICS", golden.physics, now.physics, differing, what)
@@ -138,9 +150,10 @@ def unrecorded(golden: Golden, now: Golden) -> str | None:
         return f"PHYSICS is {now.physics} and the golden file is of {golden.physics}: record it (make golden)"
     cases = {name for bits in golden.machines for name in bits.digests}
     names = set(golden.defaults) ^ set(now.defaults) | set(now.machines[0].digests) ^ cases
-    if not names:
-        return None
-    return f"in the golden file or in the program only: {', '.join(sorted(names))}; record it (make golden)"
+    if names:
+        return f"in the golden file or in the program only: {', '.join(sorted(names))}; record it (make golden)"
+    benches = [name for name in _differing(golden, now)[0] if name.startswith(BENCH)]
+    return f"measured otherwise than before: {', '.join(benches)}; record it (make golden)" if benches else None
 
 
 def _differing(golden: Golden, now: Golden) -> tuple[list[str], str]:
@@ -164,8 +177,14 @@ def recorded(golden: Golden | None, now: Golden) -> Golden:
     if now.physics > golden.physics:
         return replace(now, before=replace(golden, before=None, first_steps={}))
     (today,) = now.machines
+    benches = [name for name in _differing(golden, now)[0] if name.startswith(BENCH)]
     others = [
-        replace(bits, digests={name: bits.digests[name] for name in bits.digests if name in today.digests})
+        replace(
+            bits,
+            digests={
+                name: bits.digests[name] for name in bits.digests if name in today.digests and name not in benches
+            },
+        )
         for bits in golden.machines
         if bits.machine != today.machine
     ]

@@ -150,3 +150,23 @@ def test_a_machine_without_a_new_case_compares_that_case_by_its_first_steps():
     assert contradiction(both, here()) is unrecorded(both, here()) is None
     assert "heap" in contradiction(both, here(heap="b"))
     assert "drum" in contradiction(both, here(drum=STATE + 3.0 * TOLERANCE))
+
+
+def test_a_bench_test_that_measures_otherwise_is_recorded_under_the_same_number():
+    """Nothing that is stored depends on it; but it does not change unseen, on this machine or on another."""
+    kept = golden(**{"bench, slope": "s"})
+    kept = replace(kept, first_steps=kept.first_steps | {"bench, slope": np.array([0.5, 1e7])})
+    line = "measured otherwise than before: bench, slope; record it (make golden)"
+    here = replace(golden(**{"bench, slope": "t"}), first_steps=kept.first_steps)
+    assert (contradiction(kept, here), unrecorded(kept, here)) == (None, line)
+    after = recorded(kept, here)
+    assert contradiction(after, here) is unrecorded(after, here) is None
+    for share, expected in ((1e-6, None), (1e-4, line)):
+        moved = kept.first_steps | {"bench, slope": np.array([0.5, 1e7 * (1.0 + share)])}
+        there = replace(golden(machine=THERE, **{"bench, slope": "u"}), first_steps=moved)
+        assert (contradiction(kept, there), unrecorded(kept, there)) == (None, expected)
+    # What another machine had recorded of it no longer counts.
+    assert [set(bits.digests) for bits in recorded(kept, there).machines] == [
+        {"heap", "pour", "bench, slope"},
+        {"heap", "pour"},
+    ]
