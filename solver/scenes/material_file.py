@@ -36,7 +36,7 @@ from solver.scenes.contact_model import ContactModel
 from solver.scenes.insertion import Insertion
 from solver.scenes.material import Material, Pair
 from solver.scenes.numerics import Numerics
-from solver.scenes.scene import Scene, with_rig, with_values
+from solver.scenes.scene import Scene, canonical, with_rig, with_values
 from solver.scenes.sizes import SizeDistribution
 from solver.shapes.clump_error import ClumpFit
 from solver.shapes.solid import ShapeError, Solid
@@ -175,7 +175,7 @@ class MaterialFile(TomlTable):
     contact_law: str | None = None
     """The same as law in [contact]."""
     assumed: Annotated[tuple[str, ...], Names()] = ()
-    """Paths of values that were not measured."""
+    """What was not measured: ``materials.seed.density``, ``pair.seed.steel.restitution``, ``body.seed.shape``."""
     measured: Settings = Field(default_factory=dict)
     """Where measured values come from, as ``explorer lab`` writes it."""
     rig: RigTable = Field(default_factory=dict)
@@ -244,7 +244,18 @@ def scene_from(table: dict[str, Any], path: Path) -> Scene:
     scene = with_set_up(scene, table, path.parent)
     if file.contact_law and scene.contact.law != law:
         raise ParameterError(f"contact_law: {law!r} is not the {scene.contact.law!r} of contact.law")
-    return scene
+    return replace(scene, assumed=tuple(_assumed(scene, name) for name in file.assumed))
+
+
+def _assumed(scene: Scene, name: str) -> str:
+    """``name`` as reports look it up: a parameter may be named by its path (``material.…``, a pair in either order) or
+    as the file writes it (``materials.…``)."""
+    path = name.replace("materials.", "material.", 1)
+    try:
+        found = canonical(scene, path)
+    except ParameterError:  # Young's modulus, a shape: no parameters
+        found = path
+    return found.replace("material.", "materials.", 1) if found.startswith("material.") else found
 
 
 def with_set_up(scene: Scene, table: Mapping[str, Any], folder: Path | None = None) -> Scene:

@@ -104,6 +104,11 @@ def mutated(**changes):
         ({"body__0__spheres": "tiny"}, "coarse"),
         ({"body": 3}, r"body: 3; allowed: a list of tables \[\[body\]\]"),
         ({"assumed": 3}, "assumed: 3; allowed: a list of names"),
+        (
+            {"assumed": ["materials.seed.densty"]},
+            "assumed: 'materials.seed.densty' is no value of this material; allowed",
+        ),
+        ({"assumed": ["body.lentil.shape"]}, "assumed: 'body.lentil.shape' is no value"),
         ({"pair__seed__seed": None}, r"pair\.seed\.seed: no such pair"),
         ({"pair__seed__seed__restitution": 1.5}, "restitution"),
         ({"pair__seed__seed__restitution": None}, "restitution is missing"),
@@ -123,6 +128,15 @@ def test_bad_material_files_say_what_is_allowed(changes, says):
     with pytest.raises(ValueError, match=says) as error:
         scene_from(mutated(**changes), PATH)
     assert "\n" not in str(error.value)
+
+
+def test_what_is_assumed_may_be_named_by_its_path():
+    table = mutated(assumed=["material.seed.density", "materials.seed.youngs_modulus", "pair.plate.seed.restitution"])
+    assert scene_from(table, PATH).assumed == (
+        "materials.seed.density",
+        "materials.seed.youngs_modulus",
+        "pair.seed.plate.restitution",
+    )
 
 
 def test_a_bad_file_is_named(tmp_path):
