@@ -104,11 +104,6 @@ def mutated(**changes):
         ({"body__0__spheres": "tiny"}, "coarse"),
         ({"body": 3}, r"body: 3; allowed: a list of tables \[\[body\]\]"),
         ({"assumed": 3}, "assumed: 3; allowed: a list of names"),
-        (
-            {"assumed": ["materials.seed.densty"]},
-            "assumed: 'materials.seed.densty' is no value of this material; allowed",
-        ),
-        ({"assumed": ["body.lentil.shape"]}, "assumed: 'body.lentil.shape' is no value"),
         ({"pair__seed__seed": None}, r"pair\.seed\.seed: no such pair"),
         ({"pair__seed__seed__restitution": 1.5}, "restitution"),
         ({"pair__seed__seed__restitution": None}, "restitution is missing"),
