@@ -14,6 +14,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 
@@ -30,6 +31,17 @@ HANDS_OFF = 1.5
 """Seconds after the user's input during which the program's own value does not move the widget."""
 
 
+@dataclass(frozen=True)
+class OwnAction:
+    """An action that nobody asked for, such as a look into the store: if it succeeds, the last refusal stays told."""
+
+    act: Action
+
+    def __call__(self) -> None:
+        """Act."""
+        self.act()
+
+
 class Actions:
     """A queue of actions."""
 
@@ -41,7 +53,8 @@ class Actions:
         self._waiting.put(action)
 
     def carry_out(self) -> str | None:
-        """Run all waiting actions. Returns the message of the last refused input, "" if none was, None if nothing ran.
+        """Run all waiting actions. Returns the message of the last refused input, "" if none was, None if nothing of
+        the user's ran.
 
         Actions posted meanwhile wait for the next call, so the page is drawn between two calls, however many arrive.
         """
@@ -50,7 +63,8 @@ class Actions:
             action = self._waiting.get_nowait()
             try:
                 action()
-                notice = notice or ""
+                if not isinstance(action, OwnAction):
+                    notice = notice or ""
             except (ValueError, OSError) as error:
                 notice = refusal(error)
         return notice

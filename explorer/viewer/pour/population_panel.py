@@ -16,7 +16,7 @@ from doe.population import Comparison, Population, compared
 from explorer.background.command_process import CommandStatus
 from explorer.population.process import PopulationProcess
 from explorer.scene.source import change_lines, differences, same_bodies
-from explorer.viewer.actions import BackgroundWork
+from explorer.viewer.actions import BackgroundWork, OwnAction
 from explorer.viewer.palette import FLANK, css
 from explorer.viewer.panel import CONTROLS, SELDOM, Now, PageContext, Panel
 from explorer.viewer.pour.readout import AngleDoubt, angle_of_repose_deg
@@ -66,7 +66,9 @@ class PopulationPanel(Panel):
 
     def __init__(self, page: PageContext) -> None:
         gui = page.server.gui
-        self._session, self._post, self._work = page.session, page.post, BackgroundWork(page.post)
+        self._session, self._post = page.session, page.post
+        # Nobody asks for a look into the store.
+        self._work = BackgroundWork(lambda act: page.post(OwnAction(act)))
         self._process = PopulationProcess(page.data / "pours", page.diagnosis.store, place=page.place)
         self._doubt = AngleDoubt()
         self._scene: Scene | None = None
@@ -94,7 +96,7 @@ class PopulationPanel(Panel):
         if self._to_come is not None and not command.alive:
             (scene, pours), self._to_come = self._to_come, None
             # As an action, so that a refusal is reported and ends nothing.
-            self._post(lambda: self._begin(scene, pours))
+            self._post(OwnAction(lambda: self._begin(scene, pours)))
         if self._more.visible == command.alive:
             self._more.visible, self._stop.visible = not command.alive, command.alive
         no_draw = status.energy_put_in is not None or status.disturbed

@@ -24,7 +24,7 @@ from explorer.live.frames import Frame
 from explorer.recordings.recording import SAME_TIME, RecordedSurface, Recording
 from explorer.scene.meshes import GATE_NAME, PLATE_NAME, outlet_height, scene_height
 from explorer.units import checked
-from explorer.viewer.actions import Action, Actions, FrameClock, Post, add_keys, button_group
+from explorer.viewer.actions import Action, Actions, FrameClock, OwnAction, Post, add_keys, button_group
 from explorer.viewer.guarded_server import GuardedServer
 from explorer.viewer.look.camera import CameraPanel, pile_points
 from explorer.viewer.look.colour_by import ColourPanel
@@ -101,7 +101,7 @@ class ReplayPage:
         with tabs.add_tab("Look", viser.Icon.EYE):
             self._look = ReplayLook(server, recording, colour_bar, self._actions.post)
         self._seen = False
-        server.on_client_connect(lambda _: self._actions.post(self._begin))
+        server.on_client_connect(lambda _: self._actions.post(OwnAction(self._begin)))
         # viser's charts look right on dark and on light.
         ThemeSwitch(server, self._actions.post, lambda dark: None)
 

@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from explorer.errors import CommandError
-from explorer.viewer.actions import Actions, BackgroundWork
+from explorer.viewer.actions import Actions, BackgroundWork, OwnAction
 from tests.explorer.viewer.page_session import finished
 
 
@@ -41,3 +41,16 @@ def test_work_that_is_begun_by_what_was_done_comes_before_what_waits():
     gate.set()
     finished(actions, work)
     assert done == ["saved", "pour"]
+
+
+def test_what_the_page_does_by_itself_does_not_take_a_refusal_back():
+    actions = Actions()
+    actions.post(refused)
+    actions.post(OwnAction(lambda: None))
+    assert actions.carry_out() == "no such file"
+    actions.post(OwnAction(lambda: None))
+    assert actions.carry_out() is None
+    actions.post(OwnAction(refused))
+    assert actions.carry_out() == "no such file"
+    actions.post(lambda: None)
+    assert actions.carry_out() == ""
