@@ -18,6 +18,12 @@ from explorer.scene.source import differences
 from solver.scenes.scene import Scene
 
 
+Condition = tuple[Scene, str, bool]
+"""Parameters in force, what is being done to the pile, and whether anything was done to it before."""
+BETWEEN = 0.04
+"""Simulated time [s] by which the first status after a change may come later in one run than in another."""
+
+
 class SessionRecorder:
     """Records into the file ``to``; the k-th pour of the session (a restart begins one) into ``<stem>_<k>.rrd``.
 
@@ -25,7 +31,8 @@ class SessionRecorder:
     its own there, and no file is kept.
 
     A pour that is brought back repeats what has been recorded, so nothing is added until it is past that. Where it has
-    other parameters than were recorded for its time, it is another pour, with a file of its own from there on.
+    other parameters than were recorded for its time, or is disturbed otherwise, it is another pour, with a file of its
+    own from there on.
 
     Raises :class:`explorer.errors.CommandError` at once if a file ``to`` cannot be a new recording.
     """
@@ -39,7 +46,7 @@ class SessionRecorder:
         self._last: Status | None = None
         self._newest: tuple[Frame, Status] | None = None
         self._frame_due = self._until = self._logged = -math.inf
-        self._scenes: list[tuple[float, Scene]] = []
+        self._conditions: list[tuple[float, Condition]] = []
 
     @property
     def pours(self) -> tuple[RecordedPour, ...]:
@@ -54,16 +61,18 @@ class SessionRecorder:
             self._log, self._last = self._begin(status), status
             self._log.event(frame.time, f"phase: {status.phase}")
         if frame.time < self._until:
-            if status.scene == self._recorded_scene(status.time):
+            recorded = self._recorded_about(status.time)
+            if condition_of(status) in recorded:
                 return
-            back_at = f"brought back to {frame.time:.3f} s, and on with other parameters"
+            how = "disturbed otherwise" if status.scene in [one for one, *_ in recorded] else "with other parameters"
+            back_at = f"brought back to {frame.time:.3f} s, and on {how}"
             self._log, self._last = self._begin(status), status
             self._log.event(frame.time, back_at)
         elif status.time < self._last.time:
             return  # of a pour that was brought back a moment ago, unlike the frame
         self._until = frame.time
-        if status.scene != self._scenes[-1][1]:
-            self._scenes.append((status.time, status.scene))
+        if condition_of(status) != self._conditions[-1][1]:
+            self._conditions.append((status.time, condition_of(status)))
         log, last = self._log, self._last
         for text in news(last, status):
             log.event(frame.time, text)
@@ -96,16 +105,20 @@ class SessionRecorder:
         if self._pours and frame.inside.any():
             self._pours[-1] = self._pours[-1].with_frame(frame.time)
 
-    def _recorded_scene(self, time: float) -> Scene:
-        """The scene that was in force at ``time`` [s] of what has been recorded."""
-        before = [scene for since, scene in self._scenes if since <= time]
-        return before[-1] if before else self._scenes[0][1]
+    def _recorded_about(self, time: float) -> list[Condition]:
+        """What was in force within ``BETWEEN`` of ``time`` [s] in what has been recorded."""
+        ends = [since for since, _ in self._conditions[1:]] + [math.inf]
+        return [
+            condition
+            for (since, condition), end in zip(self._conditions, ends, strict=True)
+            if since <= time + BETWEEN and time - BETWEEN <= end
+        ]
 
     def _begin(self, status: Status) -> PourLog:
         self.close()
         self._newest = None
         self._frame_due = self._until = self._logged = -math.inf
-        self._scenes = [(status.time, status.scene)]
+        self._conditions = [(status.time, condition_of(status))]
         if isinstance(self._to, RunningViewer):
             return PourLog(self._to, status.scene, status.seed)
         path = self._to if not self._pours else self._next_path(self._to)
@@ -117,6 +130,11 @@ class SessionRecorder:
         """The next name of a file that is not there yet."""
         names = (first.with_stem(f"{first.stem}_{k}") for k in count(len(self._pours) + 1))
         return next(path for path in names if not path.exists())
+
+
+def condition_of(status: Status) -> Condition:
+    """What has to be the same where a pour that was brought back repeats what has been recorded."""
+    return status.scene, status.disturbance, status.disturbed
 
 
 def news(before: Status, now: Status) -> Iterator[str]:

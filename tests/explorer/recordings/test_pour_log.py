@@ -309,6 +309,24 @@ def test_a_pour_that_goes_on_with_other_parameters_after_going_back_has_a_file_o
     assert texts(tmp_path / "live_2.rrd") == ["brought back to 0.250 s, and on with other parameters"]
 
 
+TAPPED = {"disturbance": "the plate is tapped", "disturbed": True}
+
+
+@pytest.mark.parametrize(("first", "then"), [(TAPPED, {}), ({}, TAPPED)])
+def test_a_pour_that_is_disturbed_otherwise_after_going_back_has_a_file_of_its_own(first, then, scene, tmp_path):
+    recorder = SessionRecorder(tmp_path / "live.rrd")
+    for time, how in ((0.0, {}), (0.1, {}), (0.2, first), (0.3, first)):
+        recorder.take(frame(1, 1, time), status(scene, 1, time=time, **how))
+    # What is repeated as it was needs no file of its own, even if its status comes a little later.
+    for time, how in ((0.1, {}), (0.21, first)):
+        recorder.take(frame(2, 1, time), status(scene, 1, time=time, **how))
+    assert len(list(tmp_path.iterdir())) == 1
+    recorder.take(frame(2, 1, 0.1), status(scene, 1, time=0.1))
+    recorder.take(frame(2, 1, 0.25), status(scene, 1, time=0.25, **then))
+    recorder.close()
+    assert texts(tmp_path / "live_2.rrd") == ["brought back to 0.250 s, and on disturbed otherwise"]
+
+
 def test_the_newest_frame_of_every_pour_is_recorded(scene, tmp_path):
     """Although it comes within 20 ms of the one before, in which none is due: a file has its whole length."""
     recorder = SessionRecorder(tmp_path / "live.rrd")
