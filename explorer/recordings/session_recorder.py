@@ -17,7 +17,6 @@ from explorer.recordings.recording import FRAME_INTERVAL, RecordedPour, RunningV
 from explorer.scene.source import differences
 from solver.scenes.scene import Scene
 
-
 Condition = tuple[Scene, str, bool]
 """Parameters in force, what is being done to the pile, and whether anything was done to it before."""
 BETWEEN = 0.04
