@@ -20,6 +20,7 @@ sliding (``apparent_kinetic_friction``) while it is held so that it cannot turn;
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,6 +37,8 @@ from solver import Body, ParameterError, Scene, actual, parse_quantity
 Array = npt.NDArray[np.float64]
 
 COLUMNS = ("body", "quantity", "unit", "mean", "standard_error")
+BARE = re.compile(r"[-+0-9.eE]+")
+"""A number without a unit."""
 LEAST_ERROR = 1e-5
 """Smallest standard error of a quantity on its scale: no balance is better, and smaller ones give singular evidence."""
 
@@ -204,6 +207,10 @@ def _row(cells: Sequence[str], scene: Scene) -> MeasuredBody:
         raise MeasurementError(f"quantity: {quantity!r}; allowed: {', '.join(QUANTITIES)}")
     kind = QUANTITIES[quantity]
     suffix = "" if unit == "1" else unit
+    if not suffix and kind.unit != "1" and BARE.fullmatch(mean):
+        raise MeasurementError(
+            f"unit: {unit!r} of {quantity}; allowed: {kind.unit}, {kind.written} or another unit of it"
+        )
     numbers = {
         key: parse_quantity(f"{text}{suffix}", kind.unit, key)
         for key, text in (("mean", mean), ("standard_error", error))

@@ -25,6 +25,7 @@ EDEM_KEYS = {
     "solids_density": ("density", "kg/m3"),
     "density": ("density", "kg/m3"),
     "shear_modulus": ("shear_modulus", "Pa"),
+    "poissons_ratio": ("poisson_ratio", ""),
     "young_s_modulus": ("youngs_modulus", "Pa"),
     "youngs_modulus": ("youngs_modulus", "Pa"),
     "coefficient_of_restitution": ("restitution", ""),
@@ -36,6 +37,8 @@ EDEM_KEYS = {
     "rolling_friction_here": ("rolling_here", ""),
 }
 """EDEM's names, and those of `explorer export --to edem`, in lower case with _ between words → ours, unit."""
+NAMES = re.compile(r"material|body|bodies|particle|component|partner|geometry|wall|other|second|with")
+"""Words of a second column that holds names."""
 OWN_TABLES = ("bodies.csv", "materials.csv", "interactions.csv")
 """Of our own export, in the order in which they are read: pairs name bodies, bodies name materials."""
 ROUNDED = 1e-3
@@ -138,6 +141,8 @@ def _edem_numbers(
     width = next(k for k, (key, _) in enumerate(table.columns) if key in EDEM_KEYS)
     if width not in (1, 2):
         raise CommandError(f"{path}: {width} columns before the numbers; allowed: a material, or two of a pair")
+    if width == 2 and not _is_named(table.columns[1][0], [row[1] for row in table.rows if len(row) > 1], found, table):
+        width = 1  # of materials, after all
     for key, _ in table.columns[width:]:
         if key and key not in EDEM_KEYS and key not in SILENT:
             found.notes.append(f"{key}: no counterpart, not taken")
@@ -160,6 +165,12 @@ def _edem_numbers(
                 entry[ours] = value
             else:
                 found.materials.setdefault(names[0], {})[ours] = value
+
+
+def _is_named(header: str, cells: list[str], found: Found, table: Rows) -> bool:
+    """Whether a second column names the other material of a pair."""
+    known = {*found.materials, *found.bodies, *(_name(row[0]) for row in table.rows)}
+    return not header or NAMES.search(header) is not None or all(_name(cell) in known for cell in cells)
 
 
 def _name(name: str) -> str:

@@ -49,20 +49,25 @@ def read_liggghts(file: Path) -> Found:
                 found.notes.append(f"{style}: no counterpart, its shape is not taken")
             case ["fix", _, _, style, _, _, *weights] if style.startswith("particledistribution/discrete"):
                 shares.append((style, weights))
+            case ["fix", _, _, "gravity", _, way, *_] if way != "vector":
+                found.notes.append(f"fix gravity {way}: only a vector is taken")
             case ["fix", _, _, "gravity", size, "vector", x, y, z, *_]:
                 values = [_float(file, "fix gravity", text) for text in (size, x, y, z)]
                 length = math.hypot(*values[1:]) or 1.0
                 found.settings["gravity"] = [values[0] * one / length for one in values[1:]]
             case ["pair_style", "gran", *words]:
                 model = words
+            case ["pair_style", style, *_]:
+                found.notes.append(f"pair_style {style}: no counterpart, {HertzMindlin.name} is taken")
             case ["fix", _, _, "wall/gran", *words] if "type" in words[:-1]:
-                walls.append(f"type{words[words.index('type') + 1]}")
+                walls.append(_type(file, "wall/gran: type", words[words.index("type") + 1]))
             case ["fix", _, _, style, *words] if style.startswith("mesh/surface") and "type" in words[:-1]:
-                walls.append(f"type{words[words.index('type') + 1]}")
+                walls.append(_type(file, f"{style}: type", words[words.index("type") + 1]))
     _shares(file, found, shares)
     poured = {body["material"] for body in found.bodies.values()}
-    free = [name for name in [*walls, *found.materials] if name not in poured and name in found.materials]
-    found.wall = free[0] if free and poured else walls[0] if walls and walls[0] in found.materials else ""
+    declared = [name for name in walls if name in found.materials]
+    unpoured = [name for name in found.materials if name not in poured] if poured else []
+    found.wall = next(iter([*(name for name in declared if name not in poured), *declared, *unpoured]), "")
     if found.wall and len(set(walls)) > 1:
         found.notes.append(f"walls of {', '.join(dict.fromkeys(walls))}: all are taken as {found.wall}")
     _model(found, model, rolling)
@@ -78,37 +83,54 @@ def _commands(text: str, names: dict[str, str]) -> Iterator[list[str]]:
             words = shlex.split(line, comments=True)
         except ValueError:
             continue
-        words = [names.get(word[2:], word) if word.startswith("v_") else word for word in words]
-        if words[:1] == ["variable"] and len(words) > 3 and words[2] in ("equal", "index", "string"):
-            try:
-                value = number(ast.parse("".join(words[3:]).replace("^", "**"), mode="eval").body, {})
-                names[words[1]] = repr(value)
-            except (ValueError, SyntaxError):
-                names.setdefault(words[1], words[3])
-        elif words:
-            yield words
+        words = [re.sub(r"\bv_(\w+)", lambda m: names.get(m[1], m[0]), word) for word in words]
+        match words:
+            case ["variable", name, "equal", *parts] if parts:
+                try:  # fifteen digits, as LAMMPS writes them: a whole number stays one
+                    names[name] = f"{_value(''.join(parts)):.15g}"
+                except (ValueError, SyntaxError):
+                    names[name] = "".join(parts)
+            case ["variable", name, "index", value, *_]:
+                names.setdefault(name, value)  # a later list does not replace an earlier one
+            case ["variable", name, "string", value, *_]:
+                names[name] = value
+            case [_, *_]:
+                yield words
+
+
+def _value(text: str) -> float:
+    return number(ast.parse(text.replace("^", "**"), mode="eval").body, {"PI": math.pi})
 
 
 def _float(file: Path, where: str, text: str) -> float:
     try:
-        return number(ast.parse(text.replace("^", "**"), mode="eval").body, {})
+        value = _value(text)
     except (ValueError, SyntaxError):
-        raise CommandError(
-            f"{file}: {where}: {text!r} is not a number; allowed: numbers, variables of numbers"
-        ) from None
+        value = math.nan
+    if not math.isfinite(value):
+        raise CommandError(f"{file}: {where}: {text!r} is not a number; allowed: numbers, variables of numbers")
+    return value
+
+
+def _type(file: Path, where: str, text: str) -> str:
+    """The material of an atom type."""
+    value = _float(file, where, text)
+    if value != int(value) or value < 1.0:
+        raise CommandError(f"{file}: {where} {text}; allowed: a whole number from 1 on")
+    return f"type{int(value)}"
 
 
 def _property(
     file: Path, found: Found, rolling: dict[frozenset[str], float], key: str, kind: str, rest: list[str]
 ) -> None:
     where = f"property/global {key}"
-    if key in MATERIAL_OF and kind == "peratomtype":
+    if key in MATERIAL_OF and kind in ("peratomtype", "atomtype"):
         for k, text in enumerate(rest, start=1):
             found.materials.setdefault(f"type{k}", {})[MATERIAL_OF[key]] = _float(file, where, text)
-    elif (key in PAIR_OF or key == ROLLING) and kind == "peratomtypepair":
+    elif (key in PAIR_OF or key == ROLLING) and kind in ("peratomtypepair", "atomtypepair"):
         n, values = int(_float(file, where, (rest or ["0"])[0])), [_float(file, where, text) for text in rest[1:]]
         if n < 1 or len(values) != n * n:
-            raise CommandError(f"{file}: {where} peratomtypepair {n}: {len(values)} values; allowed: {n * n}")
+            raise CommandError(f"{file}: {where} {kind} {n}: {len(values)} values; allowed: {n * n}")
         for a in range(n):
             for b in range(a, n):
                 pair = frozenset((f"type{a + 1}", f"type{b + 1}"))
@@ -137,7 +159,7 @@ def _template(file: Path, found: Found, name: str, style: str, rest: list[str]) 
                 found.notes.append(f"{name}: {key} {random}: only a constant is taken")
         return None
 
-    material = f"type{(after('atom_type') or ['1'])[0]}"
+    material = _type(file, f"{where}: atom_type", (after("atom_type") or ["1"])[0])
     body: dict[str, Any] = {"material": material}
     density, radius = constant("density"), constant("radius")
     if density is not None:
@@ -151,7 +173,11 @@ def _template(file: Path, found: Found, name: str, style: str, rest: list[str]) 
         body["shape"] = {"sphere": 2.0 * radius}
     tensor = [_float(file, f"{where}: inertia_tensor", text) for text in after("inertia_tensor", 6)]
     if style.endswith("/multisphere"):
-        if not (after("mass") and len(tensor) == 6 and tensor[1] == tensor[2] == tensor[4] == 0.0):
+        if "use_volume" in rest:
+            found.notes.append(
+                f"{name}: a clump whose centre of mass follows from its volume (use_volume) is not taken"
+            )
+        elif not (after("mass") and len(tensor) == 6 and tensor[1] == tensor[2] == tensor[4] == 0.0):
             found.notes.append(f"{name}: a clump without mass and principal inertia_tensor is not taken")
         else:
             rows = _spheres(file, where, after)
@@ -170,7 +196,9 @@ def _spheres(file: Path, where: str, after: Callable[[str, int], list[str]]) -> 
         if not beside.is_relative_to(file.parent.resolve()):
             raise CommandError(f"{file}: {where}: spheres file {texts[1]}; allowed: a file beside the script")
         try:
-            texts = text_of(beside).split()
+            # As LIGGGHTS reads it: after # a comment, after four columns nothing.
+            lines = [line.partition("#")[0].split() for line in text_of(beside).splitlines()]
+            texts = [text for line in lines for text in line[:4]]
         except OSError as error:
             raise CommandError(f"{file}: {where}: spheres file {texts[1]}: {error.strerror}") from None
         scale = _float(file, where, (after("scale", 1) or ["1"])[0])
@@ -183,17 +211,22 @@ def _spheres(file: Path, where: str, after: Callable[[str, int], list[str]]) -> 
 
 
 def _shares(file: Path, found: Found, shares: list[tuple[str, list[str]]]) -> None:
-    """Mass fractions, where one distribution by mass names every template."""
-    for style, weights in shares:
-        parts = dict(zip(weights[::2], weights[1::2], strict=False))
-        if set(parts) != set(found.bodies) or len(parts) < 2:
-            continue
-        if style.endswith("numberbased"):
+    """Keep the templates that are poured; their mass fractions, where there is one distribution, by mass."""
+    every = [(style, dict(zip(weights[::2], weights[1::2], strict=False))) for style, weights in shares]
+    named = {name for _, parts in every for name in parts} & set(found.bodies)
+    for name in [name for name in found.bodies if named and name not in named]:
+        del found.bodies[name]
+        found.notes.append(f"{name}: in no particledistribution, so not poured")
+    if len(every) > 1:
+        found.notes.append(f"{len(every)} particledistributions: shares of the mass are not taken")
+        return
+    for style, parts in every:
+        if style.endswith("numberbased") and len(parts) > 1:
             found.notes.append("particledistribution by number: shares of the mass are not taken")
-            continue
-        values = {name: _float(file, style, text) for name, text in parts.items()}
-        for name, value in values.items():
-            found.bodies[name]["mass_fraction"] = value / sum(values.values())
+        elif set(parts) == named and len(parts) > 1:
+            values = {name: _float(file, style, text) for name, text in parts.items()}
+            for name, value in values.items():
+                found.bodies[name]["mass_fraction"] = value / sum(values.values())
 
 
 def _model(found: Found, words: list[str], rolling: Mapping[frozenset[str], float]) -> None:

@@ -19,6 +19,8 @@ from explorer.export.deck import read_deck
 from explorer.export.yade import LAW
 from explorer.imported.found import Found, Numbers, called, number, restitution_of, text_of
 
+UNKNOWN = ast.Name("a value that only a run gives")
+
 
 def read_yade(file: Path) -> Found:
     """What the calls in a YADE script say: FrictMat, sphere, the Ip2 functor. Of an exported deck: its tables."""
@@ -26,17 +28,26 @@ def read_yade(file: Path) -> Found:
     if DECK in text and (file.parent / DECK).is_file() and (file.parent / LAW).is_file():
         return _deck(file.parent)
     try:
-        tree = ast.parse(text)
+        return _read(file, ast.parse(text))
     except SyntaxError as error:
         raise CommandError(f"{file}: line {error.lineno}: is not Python: {error.msg}") from None
+    except RecursionError:
+        raise CommandError(f"{file}: an expression is nested too deeply; allowed: up to some hundred terms") from None
+
+
+def _read(file: Path, tree: ast.Module) -> Found:
     found, constants = Found(), _constants(tree)
     angles: Numbers = {}
+    spoken: dict[str | int, str] = {}
     calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
     labels = _labels(tree)
     for call in sorted(calls, key=lambda node: (node.lineno, node.col_offset)):
         kind, words = called(call.func), _words(call)
         if kind == "FrictMat":
-            _frict_mat(file, found, angles, call, words, constants(call), labels)
+            name = _frict_mat(file, found, angles, call, words, constants(call), labels)
+            label = words.get("label")
+            said = str(label.value) if isinstance(label, ast.Constant) else name
+            spoken |= dict.fromkeys((said, labels.get(id(call), name), name, len(found.materials) - 1), name)
         elif kind.endswith("Mat") and kind[:1].isupper():
             found.notes.append(f"{kind} (line {call.lineno}): only FrictMat is taken")
     if not found.materials:
@@ -44,18 +55,30 @@ def read_yade(file: Path) -> Found:
     for call in calls:
         kind, words, names = called(call.func), _words(call), constants(call)
         if kind == "sphere" or kind in ("wall", "facet", "box"):
-            _placed(found, kind, call, words, names)
-        elif kind == "NewtonIntegrator" and isinstance(words.get("gravity"), ast.Tuple | ast.List):
-            try:
-                found.settings["gravity"] = [number(one, names) for one in words["gravity"].elts]  # type: ignore[attr-defined]
-            except ValueError as error:
-                found.notes.append(f"gravity: {error} is not known without running the script, not taken")
+            _placed(found, kind, call, words, names, spoken)
+        elif kind == "NewtonIntegrator" and "gravity" in words:
+            _gravity(found, words["gravity"], names)
+        elif kind.startswith("Law2_") and "Mindlin" not in kind:
+            found.notes.append(f"{kind}: another contact law; here Hertz's is taken with the same E, ν and friction")
     _frictions(found, angles)
     for call in calls:
         if called(call.func).startswith("Ip2_"):
             _functor(found, call, constants(call))
     found.notes.append("not taken: bodies' places, geometry, engines and time step of the script")
     return found
+
+
+def _gravity(found: Found, given: ast.expr, names: Mapping[str, float]) -> None:
+    """Three numbers in a tuple, a list or a ``Vector3``."""
+    parts = given.elts if isinstance(given, ast.Tuple | ast.List) else []
+    if isinstance(given, ast.Call) and called(given.func) == "Vector3":
+        parts = given.args
+    try:
+        if len(parts) != 3:
+            raise ValueError(ast.unparse(given))
+        found.settings["gravity"] = [number(one, names) for one in parts]
+    except ValueError as error:
+        found.notes.append(f"gravity: {error} is not known without running the script, not taken")
 
 
 def _words(call: ast.Call) -> dict[str, ast.expr]:
@@ -67,28 +90,41 @@ def _constants(tree: ast.Module) -> Callable[[ast.Call], dict[str, float]]:
     """Names that stand for a number where a call is made: the script's assignments above it, or for a call within a
     function, which may run later, all of them.
     """
-    assigned = [node for node in tree.body if isinstance(node, ast.Assign) and len(node.targets) == 1]
     parts = [node for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)]
     later = {id(inner) for part in parts for inner in ast.walk(part)}
 
     def known(call: ast.Call) -> dict[str, float]:
         names: dict[str, float] = {}
-        for node in assigned:
+        for node in tree.body:
             if id(call) not in later and (node.lineno, node.col_offset) >= (call.lineno, call.col_offset):
                 break
-            target, value = node.targets[0], node.value
-            pairs = [(target, value)]
-            if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and len(target.elts) == len(value.elts):
-                pairs = list(zip(target.elts, value.elts, strict=True))
-            for one, expression in pairs:
-                if isinstance(one, ast.Name):
-                    try:
-                        names[one.id] = number(expression, names)
-                    except ValueError:
-                        names.pop(one.id, None)
+            for name, expression in _bound(node):
+                try:
+                    names[name] = number(expression or UNKNOWN, names)
+                except ValueError:
+                    names.pop(name, None)
         return names
 
     return known
+
+
+def _bound(node: ast.stmt) -> list[tuple[str, ast.expr | None]]:
+    """Names that a statement of the script gives a value, with the expression; None where that has to be run."""
+    match node:
+        case ast.Assign(targets=[ast.Tuple(elts=targets)], value=ast.Tuple(elts=values)) if len(targets) == len(values):
+            pairs = list(zip(targets, values, strict=True))
+        case ast.Assign(targets=targets, value=value):
+            pairs = [(target, value) for target in targets]
+        case ast.AnnAssign(target=target, value=value) if value is not None:
+            pairs = [(target, value)]
+        case ast.AugAssign(target=ast.Name(id=name) as target, op=op, value=value):
+            pairs = [(target, ast.BinOp(ast.Name(name), op, value))]
+        case ast.FunctionDef() | ast.ClassDef():
+            return []
+        case _:  # in a loop or a condition: known only where it is run
+            stored = [one for one in ast.walk(node) if isinstance(one, ast.Name) and isinstance(one.ctx, ast.Store)]
+            return [(one.id, None) for one in stored]
+    return [(target.id, value) for target, value in pairs if isinstance(target, ast.Name)]
 
 
 def _labels(tree: ast.Module) -> dict[int, str]:
@@ -110,7 +146,8 @@ def _frict_mat(
     words: Mapping[str, ast.expr],
     names: Mapping[str, float],
     labels: Mapping[int, str],
-) -> None:
+) -> str:
+    """Take a material; returns its name."""
     label = words.get("label")
     said = label.value if isinstance(label, ast.Constant) else labels.get(id(call), "")
     name = re.sub(r"\W", "_", str(said)) or f"material{len(found.materials)}"
@@ -133,15 +170,30 @@ def _frict_mat(
             entry[ours] = value
         else:
             angles[name] = value
+    return name
 
 
-def _placed(found: Found, kind: str, call: ast.Call, words: Mapping[str, ast.expr], names: Mapping[str, float]) -> None:
-    """A call that makes a sphere or a wall: what it is made of, and the sphere's radius."""
+def _placed(
+    found: Found,
+    kind: str,
+    call: ast.Call,
+    words: Mapping[str, ast.expr],
+    names: Mapping[str, float],
+    spoken: Mapping[str | int, str],
+) -> None:
+    """A call that makes a sphere or a wall: what it is made of, and the sphere's radius.
+
+    ``spoken``: label, variable or number → material; without ``material`` YADE takes the last one.
+    """
     given = words.get("material")
+    if isinstance(given, ast.Subscript):  # O.materials["sand"]
+        given = given.slice
     said = given.value if isinstance(given, ast.Constant) else given.id if isinstance(given, ast.Name) else None
-    index = said if isinstance(said, int) else None
-    name = list(found.materials)[index] if index is not None and 0 <= index < len(found.materials) else str(said)
-    if name not in found.materials:
+    name = list(found.materials)[-1] if given is None else spoken.get(said) if isinstance(said, str | int) else None
+    if name is None:
+        note = f"{kind}: its material {ast.unparse(words['material'])} is not known without running the script"
+        if note not in found.notes:
+            found.notes.append(note)
         return
     if kind != "sphere":
         found.wall = found.wall or name

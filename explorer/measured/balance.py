@@ -34,6 +34,10 @@ ZERO_SHARE, LEVEL_TIME, LEVEL_SHARE = 0.01, 0.1, 0.02
 no more than the third share of the change."""
 STEADY = (0.2, 0.8)
 """Shares of the mass between which the rate is taken."""
+SHARES_READ = (0.1, 0.5, 0.9)
+MOST_INTERVALS, AGAIN, FALLEN = 5.0, 0.05, 0.05
+"""A share passes once, within this number of readings and this part of the whole time; a curve falls below its zero by
+no more than the third share of the change."""
 COMPLETE = 0.02
 """Relative difference up to which the mass that passed counts as all of the poured mass."""
 FEW_STEADY = 8
@@ -66,9 +70,10 @@ class BalanceCurve:
         """The mass [kg] to which shares refer: what passed, if that counts as all of ``poured``; else ``poured``."""
         return self.total if abs(self.total - poured) <= COMPLETE * poured else poured
 
-    def line(self, poured: float, lag: float | None) -> str:
-        """What was read off the curve, its sampling and its lag; ``lag``: the stated one."""
-        said = f"stated, {lag:g} s, and taken off its times" if lag is not None else "not stated, nothing is taken off"
+    def line(self, poured: float, lag: float | None, started: bool = True) -> str:
+        """What was read off the curve, its sampling and its lag; ``lag``: the stated one, ``started``: with a start."""
+        off = "taken off its times" if started else "without --starts there is no time to take it off"
+        said = f"stated, {lag:g} s, and {off}" if lag is not None else "not stated, nothing is taken off"
         t10, t90 = (self.share_time(share, poured) for share in (0.1, 0.9))
         between = int(((self.time > t10) & (self.time < t90)).sum())
         told = between < FEW_STEADY and math.isfinite(t90)
@@ -106,6 +111,7 @@ def read_balance(path: Path) -> BalanceCurve:
             f"{path}: mass: not constant at the end; allowed: readings until the flow has stopped, with the last "
             f"{LEVEL_TIME:.0%} of the time within {LEVEL_SHARE:.0%} of the change"
         )
+    _require_one_rise(path, table, time, passed / total)
     low, high = (int(np.argmax(passed >= share * total)) for share in STEADY)
     if high - low < 2:
         raise CommandError(
@@ -124,6 +130,29 @@ def read_balance(path: Path) -> BalanceCurve:
         rate=float(rate),
         lag=max(0.0, math.e * left / float(rate)),
     )
+
+
+def _require_one_rise(path: Path, table: CellTable, time: Array, share: Array) -> None:
+    """Refuse a curve that a touched pan has spoilt: its times would be those of the disturbance.
+
+    ``share``: of the mass that has passed at the end, shape (k,).
+    """
+    if share.min() < -FALLEN:
+        line = table.rows[int(share.argmin()) + 1][0]
+        raise CommandError(
+            f"{path}:{line}: mass: {-share.min():.0%} of the change on the other side of its first readings, which are "
+            "the zero; allowed: a curve that begins before the flow does, with the pan untouched"
+        )
+    apart = max(MOST_INTERVALS * float(np.median(np.diff(time))), AGAIN * float(time[-1] - time[0]))
+    for wanted in SHARES_READ:
+        first = int(np.argmax(share >= wanted))
+        last = int(np.flatnonzero(share < wanted)[-1]) + 1
+        if time[last] - time[first] > apart:
+            line = table.rows[first + 1][0]
+            raise CommandError(
+                f"{path}:{line}: mass: {wanted:.0%} of the change has passed at {time[first]:.4g} s, and again at "
+                f"{time[last]:.4g} s; allowed: a curve that goes one way (leave out rows in which the pan was touched)"
+            )
 
 
 def _last(time: Array, values: Array) -> Array:

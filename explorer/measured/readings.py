@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from hashlib import sha256
 from pathlib import Path
 from typing import Literal, TypeVar
 
@@ -49,6 +50,8 @@ SURFACE_PLACES = 13
 """Points along a drum's free surface."""
 PLACES = 21
 """Points of a curve of discharged mass."""
+FLATTEST = 3.0
+"""Angle [°] below which a number after --angles is taken for what follows a decimal comma."""
 SAME = 0.02
 """Relative difference allowed between the Froude numbers of a drum's sheet and of the rig."""
 
@@ -120,6 +123,8 @@ def read_brought(brought: Brought, scene: Scene) -> Readings:
         _photographs(brought, found)
     if drum and sum(given is not None for given in (brought.photographs or None, brought.angles, brought.drum)) > 1:
         raise CommandError(f"--photo, --angles, --drum: each gives {DYNAMIC}; allowed: one of them for a condition")
+    if piles and brought.angles is not None and next((one for one in ANGLES if one in given), "") == VIEW:
+        raise CommandError(f"--photo, --angles: each gives {VIEW}; allowed: one of them for a condition")
     if brought.angles is not None:
         name = next((name for name in ANGLES if name in given), "")
         _check("--angles", bool(name), scene)
@@ -198,16 +203,23 @@ def _faces(brought: Brought, rig: RotatingDrum, found: Readings) -> None:
     )
 
 
+def _refuse_twins(option: str, files: Sequence[Path]) -> None:
+    """Each file has to be of another pour."""
+    seen: dict[bytes, Path] = {}
+    for file in files:
+        if (twin := seen.setdefault(sha256(file.read_bytes()).digest(), file)) is not file:
+            what = "picture" if option == "--photo" else "file"
+            raise CommandError(f"{option} {file}: is the same {what} as {twin}; take one of another pour")
+
+
 Reading = TypeVar("Reading")
 
 
 def _each(files: Sequence[Path], read: Callable[[Picture], Reading | Refusal]) -> list[Reading]:
     """What ``read`` gives for each picture; no two may be the same, as each has to show another pour."""
-    seen: dict[bytes, Path] = {}
+    _refuse_twins("--photo", files)
     found = []
     for file in files:
-        if (twin := seen.setdefault(file.read_bytes(), file)) is not file:
-            raise CommandError(f"--photo {file}: is the same picture as {twin}; take one of another pour")
         one = read(open_picture(file))
         if isinstance(one, Refusal):
             raise CommandError(f"--photo {file}: no angle: {one.reason}: {one.detail}")
@@ -218,10 +230,16 @@ def _each(files: Sequence[Path], read: Callable[[Picture], Reading | Refusal]) -
 def _angles(text: str) -> list[float]:
     """Angles from ``24.1,25.0`` or from a column of a file."""
     if ".csv" not in text and ".xlsx" not in text:
+        parts = text.replace(",", ".").split(";") if ";" in text else text.split(",")
         try:
-            values = [float(part) for part in text.split(",")]
+            values = [float(part) for part in parts]
         except ValueError:
             values = [math.nan]
+        if values and min(values) < FLATTEST and ";" not in text:
+            raise CommandError(
+                f"--angles {text}: {min(values):g}° is no angle of a pile; allowed: such as 24.1,25.0 or, with decimal "
+                "commas, 24,1;25,0"
+            )
         return _checked_angles(values, f"--angles {text}")
     path, column = _named_part(text)
     table = read_table(path, MOST_BYTES, CommandError, ":{}", comments=True)
@@ -234,6 +252,8 @@ def _angles(text: str) -> list[float]:
             f"--angles {path}:{line}: column {column or 'not named'}; allowed: FILE.csv:COLUMN, one of "
             f"{', '.join(header)[:100]}"
         )
+    if column.endswith("_rad"):
+        raise CommandError(f"--angles {path}:{line}: {column}: allowed: a column in degrees, such as angle_deg")
     place = header.index(column)
     return _checked_angles(
         [table.number(cells[place] if place < len(cells) else "") for _, cells in rows], f"--angles {path}: {column}"
@@ -253,6 +273,7 @@ def _named_part(text: str) -> tuple[Path, str]:
 
 
 def _balances(brought: Brought, scene: Scene, found: Readings) -> None:
+    _refuse_twins("--balance", brought.balances)
     curves = [read_balance(file) for file in brought.balances]
     poured, lag = poured_mass(scene), brought.lag or 0.0
     if not 0.0 <= lag < math.inf:
@@ -263,7 +284,7 @@ def _balances(brought: Brought, scene: Scene, found: Readings) -> None:
                 f"--balance {curve.name}: {1e3 * curve.total:.4g} g passed, but {1e3 * poured:.4g} g is poured; state "
                 "the mass, such as --set rig.mass=30g"
             )
-        found.told.append(curve.line(poured, brought.lag))
+        found.told.append(curve.line(poured, brought.lag, bool(brought.starts)))
         if math.isnan(curve.share_time(0.9, poured)):
             if not brought.starts:
                 raise CommandError(
@@ -315,7 +336,10 @@ def _curves(curves: Sequence[BalanceCurve], starts: Sequence[float], lag: float,
 def _scans(brought: Brought, found: Readings) -> None:
     known = SURFACES + POINTS + ARRAYS
     scans: list[Scan] = []
+    _refuse_twins("--scan", [file for file in brought.scans if file.is_file()])
     for file in brought.scans:
+        if brought.scan_unit != "m" and file.suffix.lower() in ARRAYS:
+            raise CommandError(f"--scan-unit {brought.scan_unit}: {file} states its own units; allowed: other files")
         if file.suffix.lower() not in known or not file.is_file():
             raise CommandError(f"--scan {file}: allowed: an existing file ending in {', '.join(known)}")
         scans.append(read_scan(file, ScanSettings(unit=brought.scan_unit)))

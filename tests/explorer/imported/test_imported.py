@@ -361,3 +361,140 @@ def test_tables_of_names_with_blanks_come_back(tmp_path):
     assert set(again.assumed) == {"body.round one.shape"}
     assert again.material("my_bead").shear_modulus == pytest.approx(bead.shear_modulus, rel=1e-6)
     assert again.contact_pair(again.bodies[0], again.bodies[0]).restitution == 0.97
+
+
+def liggghts(*changes, more=""):
+    """The script with replacements (old, new), and further lines."""
+    text = LIGGGHTS
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    return text + more
+
+
+@pytest.mark.parametrize(
+    ("lines", "radius"),
+    [
+        ("variable q equal 0.001\nvariable r equal v_q*2", 0.002),
+        ("variable r equal 0.003\nvariable r equal 0.002", 0.002),
+        ("variable r index 0.002 0.5 0.7\nvariable r index 0.9", 0.002),
+        ("variable q equal PI\nvariable r equal 0.002*PI/${q}", 0.002),
+    ],
+)
+def test_liggghts_variables_stand_for_what_they_stand_for_there(lines, radius, tmp_path):
+    scene, _ = imported("liggghts", liggghts(("variable r equal 0.0015   # radius", lines)), tmp_path)
+    assert scene.bodies[0].extents[0] == pytest.approx(2.0 * radius)
+
+
+def test_a_liggghts_variable_that_cannot_be_read_is_no_older_one(tmp_path):
+    path = tmp_path / "in.txt"
+    lines = "variable r equal 0.002\nvariable r equal sqrt(v_unknown)*1e-3"
+    path.write_text(liggghts(("variable r equal 0.0015   # radius", lines)))
+    line = refused(explorer("new", "material", "mine", "--from-liggghts", path, "--out", tmp_path))
+    assert "radius" in line
+    assert "sqrt" in line
+
+
+def test_liggghts_atom_types_may_be_variables_and_are_whole_numbers(tmp_path):
+    text = liggghts(("atom_type 1", "atom_type ${t}"), ("units si", "units si\nvariable t equal 1"))
+    scene, _ = imported("liggghts", text, tmp_path)
+    assert (scene.bodies[0].material, scene.rig.wall) == ("type1", "type2")
+    path = tmp_path / "in.txt"
+    path.write_text(liggghts(("atom_type 1", "atom_type 1.5")))
+    line = refused(explorer("new", "material", "other", "--from-liggghts", path, "--out", tmp_path))
+    assert "atom_type 1.5; allowed: a whole number from 1 on" in line
+
+
+def test_a_liggghts_wall_of_the_poured_type_is_one(tmp_path):
+    scene, _ = imported("liggghts", liggghts(("primitive type 2", "primitive type 1")), tmp_path)
+    assert scene.rig.wall == "type1"
+
+
+def test_liggghts_takes_both_spellings_of_its_properties(tmp_path):
+    plain, _ = imported("liggghts", LIGGGHTS, tmp_path)
+    (tmp_path / "mine.toml").unlink()
+    text = liggghts(("peratomtypepair", "atomtypepair"), ("peratomtype", "atomtype"))
+    scene, _ = imported("liggghts", text, tmp_path)
+    assert (scene.materials, scene.pairs) == (plain.materials, plain.pairs)
+
+
+def test_liggghts_templates_in_no_distribution_are_not_poured(tmp_path):
+    more = "".join(
+        f"fix pts{k} all particletemplate/sphere 1 atom_type 1 density constant 2500 radius constant 0.00{k}\n"
+        for k in (2, 3)
+    )
+    text = liggghts(("1 pts1 1.0", "2 pts1 0.25 pts2 0.75"), more=more)
+    scene, said = imported("liggghts", text, tmp_path)
+    assert {body.name: body.mass_fraction for body in scene.bodies} == {"pts1": 0.25, "pts2": 0.75}
+    assert "pts3: in no particledistribution, so not poured" in said
+
+
+def test_a_liggghts_file_of_spheres_may_have_comments_and_further_columns(tmp_path):
+    (tmp_path / "clump.txt").write_text("# x y z r\n\n-0.001 0 0 0.002 7  # left\n0.001 0 0 0.002 8\n")
+    clump = "particletemplate/multisphere 1 atom_type 1 density constant 2500 nspheres 2 spheres file clump.txt "
+    clump += "scale 1.0 mass 1e-4 inertia_tensor 1e-10 0 0 2e-10 0 2e-10"
+    sphere = "particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant ${r}"
+    scene, _ = imported("liggghts", liggghts((sphere, clump)), tmp_path)
+    assert np.array(scene.bodies[0].shape.centres).tolist() == [[-0.001, 0.0, 0.0], [0.001, 0.0, 0.0]]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "note"),
+    [
+        ("pair_style gran model", "pair_style hybrid gran model", "pair_style hybrid: no counterpart"),
+        ("9.81 vector 0.0 0.0 -1.0", "9.81 chute 20", "fix gravity chute: only a vector is taken"),
+    ],
+)
+def test_what_liggghts_says_otherwise_is_noted(old, new, note, tmp_path):
+    _, said = imported("liggghts", liggghts((old, new)), tmp_path)
+    assert note in said
+
+
+@pytest.mark.parametrize(
+    "given",
+    ["material=beads", "material='beads'", "material=O.materials['beads']", "material=0", "material='my beads'"],
+)
+def test_a_yade_material_is_found_by_whatever_names_it(given, tmp_path):
+    text = YADE.replace("material='beads'", given)
+    text = text.replace("label='beads'", "label='my beads'") if "my" in given else text
+    scene, _ = imported("yade", text, tmp_path)
+    (body,) = scene.bodies
+    assert body.material in ("beads", "my_beads")
+    assert body.extents[0] == pytest.approx(4e-3)
+    assert scene.rig.wall == "plate"
+
+
+@pytest.mark.parametrize(
+    ("lines", "young"),
+    [
+        ("young *= 2", 2e7),
+        ("young: float = 3e7", 3e7),
+        ("for young in (1e6, 2e6): pass", None),
+        ("if phi: young = 5e6", None),
+    ],
+)
+def test_a_yade_number_that_changes_is_followed_or_refused(lines, young, tmp_path):
+    text = YADE.replace("beads = O", f"{lines}\nbeads = O")
+    if young is not None:
+        scene, _ = imported("yade", text, tmp_path)
+        assert scene.materials[0].youngs_modulus == pytest.approx(young)
+        return
+    path = tmp_path / "in.py"
+    path.write_text(text)
+    line = refused(explorer("new", "material", "mine", "--from-yade", path, "--out", tmp_path))
+    assert "FrictMat(young=young): cannot be evaluated" in line
+
+
+def test_yade_gravity_may_be_a_vector_and_another_law_is_noted(tmp_path):
+    text = YADE.replace("gravity=(0, 0, -9.81)", "gravity=Vector3(0, 0, -5)")
+    text = text.replace("O.engines = [", "O.engines = [\n    Law2_ScGeom_FrictPhys_CundallStrack(),")
+    scene, said = imported("yade", text, tmp_path)
+    assert scene.gravity == (0.0, 0.0, -5.0)
+    assert "Law2_ScGeom_FrictPhys_CundallStrack: another contact law" in said
+
+
+def test_an_edem_column_that_is_no_name_is_noted(tmp_path):
+    table = EDEM.replace("Material,Poisson's", "Material,Type,Poissons").replace("maize,0.4", "maize,Bulk,0.4")
+    scene, said = imported("edem", table.replace("steel,0.3", "steel,Equipment,0.3"), tmp_path)
+    assert scene.materials[0].poisson_ratio == 0.4
+    assert "type: no counterpart, not taken" in said
