@@ -68,6 +68,20 @@ def feasible(scene: Scene, calibrated: Collection[str] = ()) -> list[tuple[Chang
         if values and all(value(scene, path) == new for path, new in values.items()):
             continue  # changes nothing
         with suppress(ParameterError):  # beyond what the rig allows
+            values |= _read_later(scene, with_values(scene, dict(values)))
             with_values(scene, dict(values))
             found.append((change, values))
     return found
+
+
+def _read_later(before: Scene, after: Scene) -> dict[str, float | str]:
+    """A later reading of the pile, if it is read at a stated time and its feed takes longer than before: as long after
+    the last body."""
+    paths = ("rig.mass", "insertion.rate")
+    if before.numerics.duration <= 0.0 or not set(paths) <= set(parameters(before)):
+        return {}
+    now, then = ([float(value(scene, path)) for path in paths] for scene in (after, before))
+    longer = now[0] / now[1] - then[0] / then[1]
+    if longer <= 1e-9:
+        return {}
+    return {"numerics.duration": before.numerics.duration + longer}

@@ -144,8 +144,7 @@ def run_diagnosis(
 def joined(measurement: Measurement, *follow_ups: Measurement) -> Measurement:
     """Return ``measurement`` with the fitted conditions and the single bodies of ``follow_ups``, in their order.
 
-    Raises MeasurementError if a follow-up has other parameters, a condition whose name is already used, or a quantity
-    of a body that was measured before.
+    Raises MeasurementError if a follow-up has other parameters, or a condition whose name is already used.
     """
     for one in follow_ups:
         if one.conditions and one.parameters != measurement.parameters:
@@ -154,13 +153,6 @@ def joined(measurement: Measurement, *follow_ups: Measurement) -> Measurement:
         for name in (condition.name for condition in one.fit):
             if name in known:
                 raise MeasurementError(f"{one.folder}: condition {name!r} is already in {measurement.folder}")
-        weighed = {(body.body, body.quantity) for body in measurement.bodies}
-        for body in one.bodies:
-            if (body.body, body.quantity) in weighed:
-                raise MeasurementError(
-                    f"{one.folder}: {body.quantity} of {body.body} is already in {measurement.folder} or in another "
-                    "follow-up; allowed: once"
-                )
         conditions = (*measurement.fit, *one.fit, *measurement.holdout)
         measurement = replace(measurement, conditions=conditions, bodies=(*measurement.bodies, *one.bodies))
     return measurement

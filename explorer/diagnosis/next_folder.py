@@ -259,7 +259,7 @@ def _changed_entry(
             rig[key] = new
         elif path == "insertion.drop_speed":
             insertion["velocity"] = [0.0, 0.0, -float(new)]
-        elif kind == "insertion" and key in AS_THEY_ARE:
+        elif (kind == "insertion" and key in AS_THEY_ARE) or path == "numerics.duration":
             insertion[key] = new
         else:
             raise CommandError(f"{path}: no condition states it; allowed: rig.…, insertion.drop_speed, {AS_THEY_ARE}")
@@ -416,7 +416,7 @@ def _readme(
     settings = [f"- {_setting(condition.scene, path, new)}" for path, new in suggestion.values.items()]
     if suggestion.turned:
         settings.append(f"- the whole rig, plate and funnel: **turned by 180° on its bench**; {TURNED_FRAME}")
-    until = condition.scene.numerics.duration
+    until = float(suggestion.values.get("numerics.duration", condition.scene.numerics.duration))
     reading = f" Read each pile {number(until)} s after the first body entered, at rest or not." if until > 0.0 else ""
     drawing = " `setup.svg` shows it to scale, what changes in colour." if drawn else ""
     more = f", and a scan of each pile as `scans/{name}_1.ply` and so on" if scanned else ""
@@ -590,6 +590,9 @@ def setup_svg(scene: Scene, changed: Mapping[str, float | str]) -> str:
     if (lift := "rig.lift_speed") in known:
         words = f"lifted at {parameter_value(lift, float(value(scene, lift)))}"
         drawn.append(text(side + 10.0 / scale, 0.0, 20.0, words, lift, anchor="start"))
+    if (until := "numerics.duration") in changed:
+        words = f"read at {parameter_value(until, scene.numerics.duration)}"
+        drawn.append(text(side + 10.0 / scale, 0.0, 36.0, words, until, anchor="start"))
     drawn.append(text(0.0, 0.0, 1.6 * EDGE, PROTOCOLS[fed.protocol], "insertion.protocol"))
     if changed:
         drawn.append(text(0.0, 0.0, 2.3 * EDGE, "in this colour: what is set otherwise", next(iter(changed))))

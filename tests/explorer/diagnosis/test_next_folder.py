@@ -92,6 +92,20 @@ def test_the_drawing_shows_what_changes(tmp_path, measured, timed):
     assert sum(labels) == len(values) + bool(values)
 
 
+def test_a_pile_whose_feed_takes_longer_is_read_later(tmp_path, measured):
+    """By as much: at the time stated for the first condition a third of the mass would still be fed."""
+    scene = measured.fit[0].scene
+    found = {change.name: values for change, values in feasible(scene)}
+    fed = scene.rig.mass / scene.insertion.rate
+    slow = found["fed at 0.4 times the rate"]
+    assert slow["numerics.duration"] == pytest.approx(2.6 + 1.5 * fed)
+    assert found["half as much mass again"]["numerics.duration"] == pytest.approx(2.6 + 0.5 * fed)
+    assert all("numerics.duration" not in found[name] for name in ("half the mass", "fed four times as fast"))
+    folder = tmp_path / "next"
+    write_next(folder, SOURCE, measured, suggestion("fed at 0.4 times the rate", slow, "fit"))
+    assert "Read each pile 4.85 s after the first body" in (folder / "README.md").read_text()
+
+
 def test_the_readme_says_what_to_do(tmp_path, measured):
     text = (written(tmp_path / "next", SOURCE, measured) / "README.md").read_text()
     assert f"explorer diagnose {SOURCE.absolute()} --follow-up {tmp_path / 'next'} " in text
