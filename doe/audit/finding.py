@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -69,8 +70,10 @@ def compared(
 ) -> Figure:
     """A figure held against what was recomputed, first as it is, then with the slack that rounding of its inputs gives.
 
-    rounded: what has to have been rounded for that.
+    rounded: what has to have been rounded for that. Where nothing finite comes out, the figure cannot be checked.
     """
+    if not math.isfinite(value):
+        return unchecked(check, where, quantity, f"{how}: not defined for the printed numbers", print_.text)
     status: Status = "differs"
     if print_.agrees(value):
         status = "reproduced exactly"

@@ -133,9 +133,9 @@ def _moves(compute: Computation, values: FloatArray, halves: FloatArray) -> Floa
     base = compute(values)
     moves = [np.zeros_like(base)]
     for i in np.flatnonzero(halves > 0):
-        shifted = values.copy()
-        shifted[i] += halves[i]
-        moves.append(np.abs(compute(shifted) - base))
+        half = np.where(np.arange(len(values)) == i, halves, 0.0)
+        up, down = (np.abs(compute(values + side * half) - base) for side in (1.0, -1.0))
+        moves.append(np.where(np.isfinite(up), up, down))  # beyond the end of a root, say, nothing is defined
     return np.array(moves)
 
 

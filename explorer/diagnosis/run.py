@@ -167,10 +167,14 @@ def run_diagnose(order: DiagnoseOrder, reporter: Reporter) -> DiagnosisResult:
         raise CommandError("--effects: all of them are already in the model by --given; allowed: at least one other")
     known = {one.folder.resolve() for one in earlier.follow_ups}
     follow_ups = tuple(one for one in follow_ups if one.folder.resolve() not in known)
+    budget = Budget()
+    if order.budget is not None:
+        carried, _ = earlier.carried_into(measurement, follow_ups)
+        budget = scaled_budget(order.budget, carried, order.effects or tuple(EFFECTS))
     # Start the executor before writing to the folder: perhaps no scheduler answers.
     with kept_for_one(order.out), executor(order.threads, order.scheduler) as pool:
         reporter.begin(order.out, order.resume)
-        return _run(order, measurement, follow_ups, earlier, pool, reporter)
+        return _run(order, measurement, follow_ups, earlier, budget, pool, reporter)
 
 
 def _run(
@@ -178,6 +182,7 @@ def _run(
     measurement: Measurement,
     follow_ups: Sequence[Measurement],
     earlier: Earlier,
+    budget: Budget,
     pool: Executor,
     reporter: Reporter,
 ) -> DiagnosisResult:
@@ -185,9 +190,6 @@ def _run(
     say, names = reporter.say, order.effects or tuple(EFFECTS)
     path, as_declared = order.store or default_store(), measurement
     measurement, follow_ups = earlier.carried_into(measurement, follow_ups)
-    budget = Budget()
-    if order.budget is not None:
-        budget = scaled_budget(order.budget, measurement, names)
     say(
         f"{order.folder}: {len(measurement.fit)} fitted and {len(measurement.holdout)} held-out conditions; store "
         f"{path}"

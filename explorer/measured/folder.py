@@ -100,7 +100,9 @@ def write_condition(folder: Path, asked: NewCondition, brought: Brought) -> Writ
 
 def _begun(folder: Path, asked: NewCondition, brought: Brought) -> WrittenCondition:
     if (asked.study is None) == (asked.material is None):
-        raise CommandError(f"{folder}: a new folder needs --study or --material, the model to compare the data with")
+        raise CommandError(
+            f"{folder}: a new folder needs --study or --material, one of the two: the model to compare the data with"
+        )
     file = study_path(asked.study) if asked.study is not None else None
     named = str(read_toml(file)["material"]) if file else str(asked.material)
     scene = load_study(str(file)).scene if file else material_scene(named)

@@ -260,10 +260,11 @@ def pour(source: Source, settings: Settings | None = None, *, seed: int = 1) -> 
 
     scene = load(source, settings)
     pour_rig(scene)
-    return Poured(run_pour(scene, _checked_seed(seed), threads=1))
+    return Poured(run_pour(scene, checked_seed(seed), threads=1))
 
 
-def _checked_seed(seed: int) -> int:
+def checked_seed(seed: int) -> int:
+    """``seed`` as an int; raises ParameterError if it is none."""
     # Neither NaN nor infinity is equal to what is left of it; a store keeps 64 bits with a sign.
     if not isinstance(seed, int | float | np.integer) or seed != seed // 1 or not 0 <= seed < 2**63:
         raise ParameterError(f"seed {seed}: allowed: a whole number from 0, below 2^63")
@@ -273,9 +274,10 @@ def _checked_seed(seed: int) -> int:
 def _checked_seeds(seeds: int | Iterable[int]) -> tuple[int, ...]:
     """Seeds that are told one by one or by their number. Raises ParameterError where there are none, or one twice."""
     if isinstance(seeds, Iterable):
-        numbers = tuple(map(_checked_seed, seeds))
+        numbers = tuple(map(checked_seed, seeds))
     else:
-        numbers = tuple(range(1, int(seeds) + 1)) if seeds == seeds // 1 else ()
+        whole = isinstance(seeds, int | float | np.integer) and seeds == seeds // 1
+        numbers = tuple(range(1, int(seeds) + 1)) if whole else ()
     if not numbers:
         raise ParameterError(f"seeds {seeds}: allowed: a number of seeds from 1 on, or the seeds themselves")
     seed, times = Counter(numbers).most_common(1)[0]
@@ -337,10 +339,15 @@ def sweep(
 
     scene = load(source)
     given = _observed(scene)
-    names = tuple(given if observables is None else observables)
+    names = tuple(given if observables is None else [observables] if isinstance(observables, str) else observables)
     for name in names:
         if name not in given:
             raise ParameterError(f"observables: {name!r} is not one of {', '.join(given)}")
+    if not isinstance(values, Mapping):
+        raise ParameterError(f"values {values!r}: allowed: a dictionary of paths and their values, which may be empty")
+    paths = Counter(canonical(scene, path) for path in values)
+    if twice := [path for path, times in paths.items() if times > 1]:
+        raise ParameterError(f"values: {twice[0]} is named twice; allowed: each path once")
     numbers = _checked_seeds(seeds)
     levels = [list(one) if isinstance(one, Iterable) and not isinstance(one, str) else [one] for one in values.values()]
     for path, level in zip(values, levels, strict=True):
@@ -350,6 +357,8 @@ def sweep(
     # As they are in the scene: in SI, and a mass fraction after those that were set behind it.
     poured = [{path: value(changed, path) for path in values} for changed in (with_values(scene, row) for row in grid)]
     labels = [", ".join(f"{path}={one}" for path, one in row.items()) for row in poured]
+    if labels and (more := Counter(labels).most_common(1)[0])[1] > 1:
+        raise ParameterError(f"values: {more[0]} comes {more[1]} times; allowed: each once, as for seeds")
     settings = [Setting(label, row, len(numbers)) for label, row in zip(labels, grid, strict=True)]
     total = len(settings) * len(numbers)
     with ExitStack() as stack:

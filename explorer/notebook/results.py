@@ -17,6 +17,7 @@ from explorer.background.reporter import Reporter
 from explorer.diagnosis import run as diagnosis_run
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.errors import CommandError
+from explorer.notebook.pours import checked_seed
 from explorer.report import study_report
 from explorer.report.content import Figure, Report, Section, shown_in
 from explorer.report.diagnosis import diagnosis_report
@@ -32,6 +33,8 @@ Read = TypeVar("Read", bound=Document)
 
 MOST_HEIGHT = 800
 """Height [px] from which on charts are scrolled."""
+MOST_TRIES = 20
+"""As of ``explorer calibrate --tries``."""
 AROUND_CHART, AROUND_CHARTS = 170, 190
 """What headings and captions take [px], of each chart and of all."""
 
@@ -78,6 +81,8 @@ def run_study(
     doe.errors.StudyStopped
         What the runs of a stage gave cannot be analysed.
     """
+    if isinstance(tries, bool) or not isinstance(tries, int) or not 1 <= tries <= MOST_TRIES:
+        raise CommandError(f"tries {tries!r}: allowed: a whole number from 1 to {MOST_TRIES}")
     kept = None if store is None else Path(store)
     order = study_run.StudyOrder(
         str(study), profile, Path(out), resume=resume, store=kept, threads=workers, tries=tries
@@ -148,13 +153,13 @@ def diagnose(
     order = diagnosis_run.DiagnoseOrder(
         folder=measurement_folder(str(measurement)),
         out=Path(out),
-        effects=tuple(effects),
+        effects=(effects,) if isinstance(effects, str) else tuple(effects),
         budget=budget,
         resume=resume,
         store=None if store is None else Path(store),
         threads=workers,
         apply=apply,
-        seed=seed,
+        seed=checked_seed(seed),
         follow_up=None if follow_up is None else Path(follow_up),
         given=None if given is None else Path(given),
         plan_next=plan_next,

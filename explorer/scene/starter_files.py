@@ -100,7 +100,7 @@ def study_text(path: Path, material: str, scene: Scene) -> str:
         "study.toml",
         NAME=path.stem,
         FILE=path.name,
-        MATERIAL=material,
+        MATERIAL=material.replace("\\", "\\\\").replace('"', '\\"'),
         FACTORS=factors,
         SET_UP=_set_up_text(scene),
         OBSERVABLE=observable_names(scene)[0],

@@ -380,3 +380,33 @@ def test_a_notebook_shows_charts_in_a_frame_that_may_load_nothing(made, request)
         assert ADDRESS.findall(inside.replace(get_plotlyjs(), "")) == []
     assert repr(one) == f"<Chart {one.drawn.name!r}: {one.section}>"
     assert repr(drawn) == f"<Charts {', '.join(drawn)}>"
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda: explorer.sweep("funnel", {"rig.mass": [0.01, "10 g"]}), "comes 2 times; allowed: each once"),
+        (
+            lambda: explorer.sweep(
+                "funnel", {"pair.seed.plate.restitution": [0.2], "pair.plate.seed.restitution": [0.3]}
+            ),
+            "pair.seed.plate.restitution is named twice",
+        ),
+        (lambda: explorer.sweep("funnel", {}, seeds=None), "seeds None: allowed"),
+        (lambda: explorer.sweep("funnel", None), "values None: allowed: a dictionary"),
+        (lambda: explorer.sweep("funnel", {}, observables="angle"), "observables: 'angle' is not one of"),
+        (
+            lambda: explorer.run_study("sunflower_extract", "out", tries=0),
+            "tries 0: allowed: a whole number from 1 to 20",
+        ),
+        (lambda: explorer.diagnose("trefoil_2", "out", seed=-1), "seed -1: allowed"),
+        (lambda: explorer.diagnose("trefoil_2", "out", effects="drag"), "'drag' is not one of"),
+        (lambda: explorer.diagnose("trefoil_2", "out", effects="air_drag", budget=1), "1"),
+    ],
+)
+def test_wrong_arguments_are_one_line_and_write_nothing(call, says, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ValueError, match=re.escape(says)) as error:
+        call()
+    assert "\n" not in str(error.value)
+    assert list(tmp_path.iterdir()) == []

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from doe.audit import audit_study
-from doe.audit.printed import printed
+from doe.audit.finding import compared
+from doe.audit.printed import printed, rounding_slack
 from tests.doe.audit.made_up import clean_study
 from tests.doe.audit.test_planted import ON_THE_WALK, at
 
@@ -71,3 +72,13 @@ def test_levels_of_a_factor_that_was_not_walked_cannot_be_checked(clean):
     ascent = replace(clean.ascent, factors=("F1", "F2", "F8"))
     (figure,) = audit_study(replace(clean, ascent=ascent)).having("cannot be checked")
     assert figure.how == "the walk does not move C"
+
+
+def test_what_is_not_defined_for_the_prints_is_no_difference():
+    """sqrt(1 − r²) at r = 1.00: rounded up nothing is defined, rounded down it is 0.1."""
+    of_print, root = printed("0.05"), lambda values: np.sqrt(1.0 - values[:1] ** 2)
+    with np.errstate(invalid="ignore"):
+        slack = float(rounding_slack(root, np.array([1.0]), np.array([0.005]))[0])
+    assert slack == pytest.approx(0.0999, abs=1e-4)
+    assert compared("a", "b", "c", of_print, 0.0, "by hand", slack).status == "only if rounded"
+    assert compared("a", "b", "c", of_print, float("nan"), "by hand").status == "cannot be checked"

@@ -59,6 +59,8 @@ def test_the_numbers_of_a_declared_sphere(tmp_path):
         ("bead,weight,g,2.2,0.02", "quantity: 'weight'; allowed: mass, length, length_spread, apparent_static"),
         ("bead,mass,mm,2.2,0.02", "mean: unit 'mm' is not one of"),
         ("bead,mass,g,,0.02", "mean: "),
+        ("bead,mass,1,2.2,0.02", "unit: '1' of mass; allowed: kg, g or another unit of it"),
+        ("bead,mass,,2.2,0.02", "unit: '' of mass; allowed: kg, g or another unit of it"),
         ("bead,mass,g,-2.2,0.02", "mean: -2.2; allowed: more than 0"),
         ("bead,mass,g,2.2,0", "standard_error: 0; allowed: 1e-05 of the mean or more"),
         ("bead,mass,g,2.2,2e-5", "standard_error: 2e-5; allowed: 1e-05 of the mean or more"),

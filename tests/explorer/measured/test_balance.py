@@ -58,6 +58,23 @@ def test_shares_are_of_what_was_poured_where_some_stayed_behind(tmp_path):
     assert "83.3% of what is poured" in curve.line(1.2 * MASS, None)
 
 
+def test_a_pan_that_was_touched_is_told_by_its_line(tmp_path):
+    """A reading far above the others, before the flow, would have been the time of a tenth."""
+    time = np.arange(0.0, 8.0, 0.05)
+    touched = steady(time)
+    touched[8] += 0.3 * MASS
+    with pytest.raises(
+        CommandError, match=r"b\.csv:10: mass: 10% of the change has passed at 0\.4 s, and again at 1\.\d+ s"
+    ):
+        read_balance(write(tmp_path / "b.csv", time, touched))
+    pressed = steady(time)
+    pressed[:5] += 0.2 * MASS  # while the zero is taken
+    with pytest.raises(CommandError, match="on the other side of its first readings"):
+        read_balance(write(tmp_path / "b.csv", time, pressed))
+    noisy = steady(time) + 0.005 * MASS * np.random.default_rng(1).standard_normal(time.size)
+    assert read_balance(write(tmp_path / "b.csv", time, noisy)).rate == pytest.approx(RATE, rel=0.02)
+
+
 def test_decimal_commas_and_other_units(tmp_path):
     time = np.arange(0.0, 8.0, 0.05)
     rows = "".join(f"{1e3 * t:.1f};{m:.7f};x\n".replace(".", ",") for t, m in zip(time, steady(time), strict=True))

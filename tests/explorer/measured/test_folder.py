@@ -329,6 +329,17 @@ def test_a_diagnosis_plans_its_pours_from_the_folder(material, tmp_path):
         (["--angles", "24"], "(--uncertainty NAME=VALUE)"),
         (["--angles", "24,x"], "--angles 24,x: allowed: angles in degrees"),
         (["--angles", "24,95"], "above 0 and below 90"),
+        (
+            ["--angles", "24,1"],
+            "1° is no angle of a pile; allowed: such as 24.1,25.0 or, with decimal commas, 24,1;25,0",
+        ),
+        (["--angles", "RADIANS:angle_rad"], "angle_rad: allowed: a column in degrees"),
+        (["--balance", "RADIANS", "--balance", "RADIANS"], "is the same file as"),
+        (["--scan", "SCAN", "--scan-unit", "mm"], "--scan-unit mm: SCAN states its own units"),
+        (
+            ["--photo", "PILE", "--angles", "24,25", "--set", "rig.name=draw_down_box"],
+            "each gives angle_of_repose_deg@0",
+        ),
         (["--angles", "24,25", "--lag", "1"], "--starts, --lag: allowed only with --balance"),
         (["--angles", "24,25", "--set", "pair.glass.glass.static_friction=0.4"], "a condition cannot state it"),
         (["--angles", "24,25", "--set", "rig.name=inclined_plane"], "inclined_plane"),
@@ -347,8 +358,11 @@ def test_a_diagnosis_plans_its_pours_from_the_folder(material, tmp_path):
 )
 def test_refusals_leave_nothing_behind(arguments, words, material, pictures, tmp_path):
     blank = save(tmp_path / "blank.png", np.full((200, 300), 150, dtype=np.uint8))
-    there = {"BLANK": blank, "PILE": pictures[0]}
-    named = [there.get(one, one) for one in arguments]
+    (tmp_path / "rad.csv").write_text("angle_rad\n0.43\n0.44\n")
+    (tmp_path / "scan.npz").write_bytes(b"none")
+    there = {"BLANK": blank, "PILE": pictures[0], "RADIANS": tmp_path / "rad.csv", "SCAN": tmp_path / "scan.npz"}
+    there |= {"RADIANS:angle_rad": f"{tmp_path / 'rad.csv'}:angle_rad"}
+    named, words = [there.get(one, one) for one in arguments], words.replace("SCAN", str(tmp_path / "scan.npz"))
     before = files(tmp_path)
     line = refused(explorer("new", "measurement", "data", "--out", tmp_path, "--material", material, *named))
     assert words in line
