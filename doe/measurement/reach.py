@@ -20,6 +20,8 @@ from solver import EFFECTS, Telltale, named
 
 DISCHARGE = ("discharge_", "discharged_mass_kg", "residual_mass_kg")
 """Prefixes of the names of observables of the flow out of a container."""
+Z_95 = float(stats.norm.ppf(0.975))
+"""Half-width of the central 95 % of a normal distribution, in standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -107,10 +109,12 @@ def _resolution(name: str, unit: str, values: np.typing.NDArray[np.float64], sta
     mean = float(measured.mean()) if n else float("nan")
     if n >= 2:
         sd = float(measured.std(ddof=1))
-        error = sd / np.sqrt(n)
-        return SummaryResolution(name, unit, n, mean, sd, float(error), float(stats.t.ppf(0.975, n - 1) * error))
+        # Stated beside replicates it is of an instrument that errs equally in all: more pours do not make it smaller.
+        error, instrument = sd / np.sqrt(n), stated if np.isfinite(stated) else 0.0
+        both, half = np.hypot(error, instrument), np.hypot(stats.t.ppf(0.975, n - 1) * error, Z_95 * instrument)
+        return SummaryResolution(name, unit, n, mean, sd, float(both), float(half))
     stated = stated if n else float("nan")
-    return SummaryResolution(name, unit, n, mean, stated, stated, float(stats.norm.ppf(0.975)) * stated)
+    return SummaryResolution(name, unit, n, mean, stated, stated, Z_95 * stated)
 
 
 def _warnings(reach: Reach) -> tuple[str, ...]:

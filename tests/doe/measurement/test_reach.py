@@ -116,3 +116,12 @@ def test_a_new_effect_says_itself_what_reveals_it(tmp_path, monkeypatch):
 def test_every_observable_says_what_it_can_reveal():
     assert all(named(name).telltales for name in all_names())
     assert {telltale for name in all_names() for telltale in named(name).telltales} == set(Telltale)
+
+
+def test_an_instrument_that_errs_equally_in_all_replicates_is_not_averaged_away():
+    values = np.array([25.0, 25.1, 24.9])
+    found = _resolution("angle_of_repose_deg", "deg", values, 2.0)
+    assert found.standard_error == pytest.approx(np.hypot(0.1 / np.sqrt(3.0), 2.0))
+    assert found.half_width == pytest.approx(np.hypot(4.3027 * 0.1 / np.sqrt(3.0), 1.95996 * 2.0), rel=1e-4)
+    plain = _resolution("angle_of_repose_deg", "deg", values, float("nan"))
+    assert plain.standard_error == pytest.approx(0.1 / np.sqrt(3.0))
