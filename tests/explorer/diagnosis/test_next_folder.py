@@ -16,7 +16,8 @@ from doe.diagnose.next_experiment import RankedExperiment
 from doe.diagnose.result import BODIES_ALONE, Suggestion
 from doe.errors import MeasurementError
 from doe.measurement.load import load_measurement
-from explorer.diagnosis.next_folder import CHANGED, asks_for, read_next, setup_svg, write_next
+from explorer.diagnosis.next_folder import asks_for, read_next, write_next
+from explorer.diagnosis.setup_drawing import CHANGED, setup_svg
 from explorer.errors import CommandError
 from solver import RIGS, pour_rig, with_rig, with_values
 from solver.assets import measurement_folder
