@@ -375,5 +375,6 @@ def _of_image(path: Path, settings: ScanSettings) -> tuple[Array, float]:
     x = (np.arange(columns) + 0.5 - columns / 2) * settings.pixel
     y = -(np.arange(rows) + 0.5 - rows / 2) * settings.pixel
     places = np.stack(np.meshgrid(x, y), axis=-1)
-    height = np.where(counts > 0.0, counts * settings.step, np.nan)
+    # 0 is what the scanner has not seen; a plate at 0 scatters to both sides.
+    height = np.where(np.isfinite(counts) & (counts != 0.0), counts * settings.step, np.nan)
     return np.concatenate([places, height[:, :, None]], axis=-1).reshape(-1, 3), settings.pixel

@@ -325,3 +325,14 @@ def test_an_image_of_real_numbers_is_read(tmp_path):
 
 def test_spacing_of_points_that_all_coincide_is_zero():
     assert spacing(np.zeros((300, 3))) == 0.0
+
+
+def test_a_plate_that_scatters_about_zero_in_an_image_of_real_numbers_keeps_both_sides(tmp_path):
+    """Half of its pixels would be unseen otherwise, and the plate lie above zero."""
+    path, rng = tmp_path / "scan.tif", np.random.default_rng(5)
+    heights = rng.normal(0.0, 1e-4, (60, 60)).astype(np.float32)
+    heights[:5, :5] = 0.0
+    Image.fromarray(heights).save(path)
+    scan = read_scan(path, ScanSettings(pixel=1e-3, step=1.0, axis=(0.0, 0.0), plate=(0.0, 0.0, 0.0)))
+    assert len(scan.points) == 60 * 60 - 25
+    assert abs(float(scan.points[:, 2].mean())) < 1e-5
