@@ -112,7 +112,7 @@ def reduced_grey(grey: npt.NDArray[np.float32], scale: float) -> Array:
     """``grey`` with one pixel for ``scale`` × ``scale``."""
     if scale == 1.0:
         return grey.astype(np.float64)
-    size = (round(grey.shape[1] / scale), round(grey.shape[0] / scale))
+    size = (max(1, round(grey.shape[1] / scale)), max(1, round(grey.shape[0] / scale)))
     return np.asarray(PillowImage.fromarray(grey).resize(size, PillowImage.Resampling.BOX), dtype=np.float64)
 
 

@@ -10,6 +10,7 @@ Where a picture gives no angle, a name and a sentence say why, in place of a num
 from __future__ import annotations
 
 import math
+import struct
 import warnings
 from dataclasses import dataclass
 from enum import StrEnum
@@ -17,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from PIL import ExifTags, Image, ImageOps, UnidentifiedImageError
+from PIL import ExifTags, Image, UnidentifiedImageError
 
 Grey = npt.NDArray[np.float32]
 
@@ -32,6 +33,18 @@ FILM_DIAGONAL = math.hypot(36.0, 24.0)
 """Diagonal of a frame of 35 mm film [mm]."""
 MOST_FOCAL = 5000
 """Longest plausible focal length [mm]."""
+ODD_EXIF = (TypeError, AttributeError, KeyError, struct.error)
+"""What reading tags of an unexpected type raises."""
+TURNS = {
+    2: Image.Transpose.FLIP_LEFT_RIGHT,
+    3: Image.Transpose.ROTATE_180,
+    4: Image.Transpose.FLIP_TOP_BOTTOM,
+    5: Image.Transpose.TRANSPOSE,
+    6: Image.Transpose.ROTATE_270,
+    7: Image.Transpose.TRANSVERSE,
+    8: Image.Transpose.ROTATE_90,
+}
+"""EXIF orientation → what sets the picture upright."""
 
 
 class PhotographError(ValueError):
@@ -120,7 +133,7 @@ def open_picture(path: Path) -> Picture:
         raise PhotographError(f"{path}: {_too_many()}") from None
     except PhotographError:
         raise
-    except (OSError, ValueError, SyntaxError, EOFError, OverflowError, MemoryError) as error:
+    except (OSError, ValueError, SyntaxError, EOFError, OverflowError, MemoryError, *ODD_EXIF) as error:
         raise PhotographError(f"{path}: cannot be decoded: {' '.join(str(error).split())[:120]}") from None
 
 
@@ -131,10 +144,17 @@ def _decoded(path: Path, image: Image.Image) -> Picture:
     if min(columns, rows) < LEAST_SIDE:
         raise PhotographError(f"{path}: {columns} × {rows} px; allowed: sides of {LEAST_SIDE} px or more")
     reduced = max(1, -(-max(columns, rows) // LONGEST))
-    seen = Image.fromarray(_grey(ImageOps.exif_transpose(image), path))
+    seen = Image.fromarray(_grey(_upright(image), path))
     small = seen.reduce(reduced) if reduced > 1 else seen
     focal = _film_focal(image) * math.hypot(columns, rows) / FILM_DIAGONAL
     return Picture(path.name, np.array(small, dtype=np.float32), seen.width, seen.height, reduced, focal or None)
+
+
+def _upright(image: Image.Image) -> Image.Image:
+    """``image`` as it was held. Only its orientation is read: Pillow's own function writes all of the EXIF anew, and
+    fails where a camera has put a text in the place of a number."""
+    method = TURNS.get(image.getexif().get(ExifTags.Base.Orientation, 1))
+    return image if method is None else image.transpose(method)
 
 
 def _film_focal(image: Image.Image) -> float:

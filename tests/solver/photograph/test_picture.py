@@ -1,10 +1,11 @@
 """Picture files in: formats, orientation, depth, transparency, and every bad file in one line."""
 
 import io
+import struct
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageOps
 
 from solver.photograph import PhotographError, open_picture
 from solver.photograph.picture import LONGEST, MOST_PIXELS
@@ -109,3 +110,20 @@ def test_a_missing_file_and_a_folder_are_refused(tmp_path):
 
 def test_the_limit_is_above_a_camera_of_fifty_megapixels():
     assert 8160 * 6120 < MOST_PIXELS < 100_000_000
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_every_orientation_is_set_upright_even_beside_a_text_in_the_place_of_a_number(orientation, tmp_path):
+    """A resolution written as text made Pillow's own turning fail with a traceback."""
+    # A TIFF block of two entries: orientation, a short, and the horizontal resolution, a text at the end.
+    entries = struct.pack("<HHHIIHHII", 2, 0x0112, 3, 1, orientation, 0x011A, 2, 12, 38)
+    exif = b"Exif\0\0" + b"II*\0\x08\0\0\0" + entries + b"\0\0\0\0" + b"seventy-two\0"
+    path, levels = tmp_path / "turned.png", np.arange(120 * 160, dtype=np.uint32).reshape(120, 160) % 251
+    image = Image.fromarray(levels.astype(np.uint8))
+    image.save(path, exif=exif)
+    plain = Image.Exif()
+    plain[0x0112] = orientation
+    image.save(tmp_path / "plain.png", exif=plain)
+    with Image.open(tmp_path / "plain.png") as known:
+        expected = np.asarray(ImageOps.exif_transpose(known), dtype=np.float32)
+    assert np.array_equal(open_picture(path).grey, expected)
