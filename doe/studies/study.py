@@ -508,7 +508,7 @@ def _further(tables: dict[str, Settings]) -> dict[str, Settings]:
 
 
 def _levels(scene: Scene, entry: LevelsTable) -> Factor:
-    reference = value(scene, canonical(scene, entry.path)) if entry.reference is None else entry.reference
+    reference = value(scene, entry.path) if entry.reference is None else entry.reference
     return Factor(entry.name, *checked_levels(scene, entry.name, entry.path, (entry.low, entry.high, reference)))
 
 

@@ -21,15 +21,6 @@ if __name__ == "__main__":
     with KubeCluster(
         name="repose", image=IMAGE, n_workers=WORKERS, resources=one_core, worker_command=COMMAND
     ) as cluster:
-        command = [
-            "explorer",
-            "calibrate",
-            "--headless",
-            "--study",
-            STUDY,
-            "--profile",
-            "quick",
-            "--out",
-            "results/kubernetes",
-        ]
-        subprocess.run([*command, "--scheduler", cluster.scheduler_address], check=True)
+        study = ["--study", STUDY, "--profile", "quick", "--out", "results/kubernetes"]
+        scheduler = ["--scheduler", cluster.scheduler_address]
+        subprocess.run(["explorer", "calibrate", "--headless", *study, *scheduler], check=True)

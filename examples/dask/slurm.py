@@ -16,15 +16,6 @@ if __name__ == "__main__":
         queue="standard", account="my-project", walltime="02:00:00", cores=1, processes=1, memory="2GB"
     ) as cluster:
         cluster.scale(WORKERS)
-        command = [
-            "explorer",
-            "calibrate",
-            "--headless",
-            "--study",
-            STUDY,
-            "--profile",
-            "quick",
-            "--out",
-            "results/slurm",
-        ]
-        subprocess.run([*command, "--scheduler", cluster.scheduler_address], check=True)
+        study = ["--study", STUDY, "--profile", "quick", "--out", "results/slurm"]
+        scheduler = ["--scheduler", cluster.scheduler_address]
+        subprocess.run(["explorer", "calibrate", "--headless", *study, *scheduler], check=True)

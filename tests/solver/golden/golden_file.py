@@ -152,8 +152,13 @@ def unrecorded(golden: Golden, now: Golden) -> str | None:
     names = set(golden.defaults) ^ set(now.defaults) | set(now.machines[0].digests) ^ cases
     if names:
         return f"in the golden file or in the program only: {', '.join(sorted(names))}; record it (make golden)"
-    benches = [name for name in _differing(golden, now)[0] if name.startswith(BENCH)]
+    benches = _benches(golden, now)
     return f"measured otherwise than before: {', '.join(benches)}; record it (make golden)" if benches else None
+
+
+def _benches(golden: Golden, now: Golden) -> list[str]:
+    """Bench tests that measure otherwise."""
+    return [name for name in _differing(golden, now)[0] if name.startswith(BENCH)]
 
 
 def _differing(golden: Golden, now: Golden) -> tuple[list[str], str]:
@@ -177,7 +182,7 @@ def recorded(golden: Golden | None, now: Golden) -> Golden:
     if now.physics > golden.physics:
         return replace(now, before=replace(golden, before=None, first_steps={}))
     (today,) = now.machines
-    benches = [name for name in _differing(golden, now)[0] if name.startswith(BENCH)]
+    benches = _benches(golden, now)
     others = [
         replace(
             bits,
