@@ -12,6 +12,7 @@ from pathlib import Path
 
 from explorer.errors import CommandError
 from explorer.scene.file import load_scene, material_scene
+from explorer.scene.text import toml_value
 from solver import Parameter, Scene, is_material, observable_names, parameters, read_toml, value
 from solver.assets import own_path, shipped_assets
 from solver.rigs import RIGS
@@ -100,7 +101,8 @@ def study_text(path: Path, material: str, scene: Scene) -> str:
         "study.toml",
         NAME=path.stem,
         FILE=path.name,
-        MATERIAL=material.replace("\\", "\\\\").replace('"', '\\"'),
+        MATERIAL=material,
+        NAMED=toml_value(material),
         FACTORS=factors,
         SET_UP=_set_up_text(scene),
         OBSERVABLE=observable_names(scene)[0],
