@@ -396,6 +396,9 @@ def study_from(table: Settings, path: Path) -> Study:
     material = load_material(file.material, relative_to=path.parent)
     experiments = _experiments(material, table, path, factors, assumptions)
     readings = [*given, *(f"{name}/{one}" for name, other in experiments.items() for one in observable_names(other))]
+    observables = [target.observable for target in file.target]
+    if twice := [name for k, name in enumerate(observables) if name in observables[:k]]:
+        raise StudyFileError(f"target.observable: {twice[0]!r} appears twice")
     for target, entry in zip(file.target, table["target"], strict=True):
         one_of(target.observable, "target.observable", readings)
         _require_possible(target)
@@ -409,7 +412,7 @@ def study_from(table: Settings, path: Path) -> Study:
             f"study's own rig; allowed: {', '.join(given)}"
         )
     for name in experiments:
-        if name not in {experiment_of(target.observable) for target in file.target}:
+        if name not in map(experiment_of, observables):
             raise StudyFileError(
                 f"experiment.name: no target reads {name}; name one, such as {name}/…, or leave it out"
             )
@@ -431,7 +434,7 @@ def study_from(table: Settings, path: Path) -> Study:
         scan_values=scan_values,
         fallback=file.fallback,
         profiles=profiles or {"standard": Profile("standard")},
-        estimators=tuple(dict.fromkeys([*(target.observable for target in file.target), *estimators])),
+        estimators=tuple(dict.fromkeys([*observables, *estimators])),
         seed=file.seed,
         screening_design=screening,
         assumption_design=beside,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import typer
@@ -29,7 +28,8 @@ def measure(
     baseline: str = typer.Option(
         "auto",
         metavar="auto|Y0,Y1",
-        help="Height of the plate at the left and right edges of the picture [px from the top].",
+        help="Height of the plate at the left and right edges of the picture [px from the top]; the lens is then "
+        "corrected with --checkerboard only.",
     ),
     checkerboard: str | None = typer.Option(
         None,
@@ -67,22 +67,32 @@ def measure(
     from explorer.errors import CommandError
     from explorer.files.output_file import check_vacant
     from explorer.files.run_folder import appearing, json_text
-    from explorer.photograph.run import measure_order, run_measure
+    from explorer.photograph.run import measure_order, run_measure, write_drawings
     from explorer.photograph.target import check_targets, keep_target, write_into_study
     from explorer.terminal.photograph import measure_result, measure_text, refusal_lines
 
     order = measure_order(
         photos, scale, reference_length, reference, baseline, plot, outline, from_simulation, checkerboard
     )
-    _refuse_twins(order.pictures)
     if report is not None:
         check_vacant(report, "--report")
-    study = target if target is not None and target.suffix == ".toml" and not target.is_dir() else None
+    elif author or notes:
+        raise CommandError("--author and --notes: are printed in a report; add --report DIR")
+    study = target if target is not None and target.suffix.lower() == ".toml" and not target.is_dir() else None
     if study is not None:
         if not study.is_file():
             raise CommandError(f"--target {study}: no such study; `explorer new study NAME` writes one")
         check_targets(load_study(str(study)).targets)
     measured = run_measure(order)
+    # The target first: it alone may refuse what was measured, and files written before would be in the way next time.
+    if target is not None and not measured.refusals:
+        line = (
+            write_into_study(study, measured)
+            if study is not None
+            else f"{target}: {keep_target(target, order.pictures, measured).line}"
+        )
+        typer.echo(line, err=json)
+    write_drawings(order, measured)
     if report is not None:
         from explorer.photograph.result import photograph_result
         from explorer.report.folder import write_report
@@ -92,13 +102,6 @@ def measure(
         text = json_text(result.to_dict()) + "\n"
         with appearing(report, "--report") as folder:
             write_report(photograph_report(result, read_picture(order, measured)), folder, {result.NAME: text})
-    if target is not None and not measured.refusals:
-        line = (
-            write_into_study(study, order.pictures, measured)
-            if study is not None
-            else f"{target}: {keep_target(target, order.pictures, measured).line}"
-        )
-        typer.echo(line, err=json)
     if json:
         typer.echo(json_text(measure_result(measured)))
     else:
@@ -106,14 +109,6 @@ def measure(
     for line in refusal_lines(measured.refusals):
         typer.echo(line, err=True)
     if measured.refusals:
+        if target is not None:
+            typer.echo(f"--target {target}: nothing is written while a picture has no angle", err=True)
         raise typer.Exit(FAILURE)
-
-
-def _refuse_twins(pictures: Sequence[Path]) -> None:
-    """Raise CommandError if a picture is given twice, even under two names: its pile would be counted twice."""
-    from explorer.errors import CommandError
-
-    seen: dict[bytes, Path] = {}
-    for picture in pictures:
-        if (twin := seen.setdefault(picture.read_bytes(), picture)) is not picture:
-            raise CommandError(f"{picture}: is the same picture as {twin}; name each pile once")

@@ -39,10 +39,9 @@ from explorer.laboratory.part import part_table
 from explorer.laboratory.run import LabOrder, analysed, files_of, part_file
 from explorer.measured.folder import NewCondition, write_condition, written_text
 from explorer.measured.readings import Brought
-from explorer.photograph.annotated import sheet
 from explorer.photograph.marks import UNMARKED, Marks
 from explorer.photograph.result import MeasuredPhotographs
-from explorer.photograph.run import MeasureOrder, measure_order, outline_text, run_measure
+from explorer.photograph.run import MeasureOrder, drawn_sheet, measure_order, outline_text, run_measure
 from explorer.photograph.simulated import SimulatedViews
 from explorer.photograph.target import PhotographedTarget, check_targets, keep_target
 from explorer.report.bench import bench_record, bench_report
@@ -57,7 +56,6 @@ from explorer.terminal.photograph import NOTE, Rows, measure_tables
 from explorer.terminal.pours import bench_text
 from solver import Scene, read_toml, with_values
 from solver.assets import asset_path, photograph_scales, shipped_assets
-from solver.photograph import open_picture
 
 PART = "Points of every replicate; the line is the part that the modulus is taken from, drawn on to zero force."
 ON_THE_SOLVER = "What the solver's own instrument read in the course of the test."
@@ -186,7 +184,7 @@ def photograph_result(read: PhotographReading) -> CommandResult:
     """`explorer measure`: the angle of repose on a photograph, or why there is none."""
     order, measured = read.order, read.measured
     words = ["explorer", *measure_words(read)]
-    drawn = sheet([open_picture(order.pictures[0])], measured.readings, None)
+    drawn = drawn_sheet(order, measured)
     file = io.BytesIO()
     drawn.save(file, "PNG")
     stem = order.pictures[0].stem

@@ -6,13 +6,14 @@ and upper third of each flank. All have a dark rim, to be seen on any grey.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
+from explorer.photograph.result import MeasuredPhotographs
 from explorer.photograph.simulated import SimulatedPiles
 from explorer.terminal.photograph import angle_text
 from solver.observables.repose import flank_feet
@@ -24,6 +25,7 @@ Colour = tuple[int, int, int]
 
 WIDTH = 960
 MOST_PANELS = 24
+"""Largest number of pictures on a sheet."""
 MARGIN = 12
 TEXT = 18
 OUTLINE: Colour = (255, 255, 255)
@@ -37,19 +39,18 @@ LEVEL_DEG = 1.0
 
 
 def sheet(
-    pictures: Sequence[Picture],
-    readings: Sequence[PhotographedPile | Refusal],
-    simulated: SimulatedPiles | None,
+    pictures: Iterable[tuple[Picture, PhotographedPile | Refusal]],
+    measured: MeasuredPhotographs,
     thirds: bool = False,
 ) -> Image.Image:
-    """All panels, one below the other; at most the first ``MOST_PANELS`` pictures.
+    """All panels, one below the other: ``pictures``, each with its reading, and a simulated pile that was ``measured``.
 
     ``thirds``: with the lines of the thirds.
     """
-    panels = [_panel(*pair, thirds) for pair in zip(pictures, readings, strict=True)][:MOST_PANELS]
+    panels = [_panel(*pair, thirds) for pair in pictures]
+    simulated = measured.simulated
     if simulated is not None:
-        piles = [reading for reading in readings if isinstance(reading, PhotographedPile)]
-        panels.append(_simulated_panel(simulated, piles[0] if piles else None))
+        panels.append(_simulated_panel(simulated, measured.piles[0] if measured.piles else None))
     whole = Image.new("RGB", (WIDTH, sum(panel.height for panel in panels)), GROUND)
     top = 0
     for panel in panels:

@@ -63,6 +63,8 @@ class MeasuredPhotographs:
     simulated: SimulatedPiles | None
     board: Board | None = None
     """The checkerboard that told the lens."""
+    scale_from: str = ""
+    """What told the length of a pixel, in words; empty: nothing."""
 
     @property
     def piles(self) -> tuple[PhotographedPile, ...]:
@@ -105,6 +107,8 @@ class ReadPile(Record):
     """Of the picture [px]: columns, rows."""
     pixel: float = 0.0
     """Length of a pixel in ``unit``."""
+    scale_from: str = ""
+    """What told it, in words."""
     base: tuple[float, float] = (math.nan, math.nan)
     """y of the base line at the left and the right edge of the picture [px]."""
     base_error: float = math.nan
@@ -129,6 +133,8 @@ class PhotographResult(Document):
     about: About = field(default_factory=About)
     simulated: str = ""
     """What was poured beside it, if anything."""
+    kept: bool | None = None
+    """Whether the names are those of pictures kept as a target (`target.py`); None in a record of before."""
 
     @property
     def over_pictures(self) -> OverPictures:
@@ -139,20 +145,20 @@ class PhotographResult(Document):
 def photograph_result(measured: MeasuredPhotographs, author: str, notes: str) -> PhotographResult:
     """The record of what was measured."""
     return PhotographResult(
-        piles=tuple(_read(one, measured.board) for one in measured.readings if isinstance(one, PhotographedPile)),
-        refused={one.name: f"{one.reason}: {one.detail}" for one in measured.readings if isinstance(one, Refusal)},
+        piles=tuple(_read(one, measured) for one in measured.piles),
+        refused={one.name: f"{one.reason}: {one.detail}" for one in measured.refusals},
         versions=versions(),
         about=made_today(author, notes),
         simulated=measured.simulated.source if measured.simulated else "",
+        kept=False,
     )
 
 
-def _read(pile: PhotographedPile, board: Board | None) -> ReadPile:
+def _read(pile: PhotographedPile, measured: MeasuredPhotographs) -> ReadPile:
     step = max(1, -(-pile.outline.u.size // MOST_POINTS))
     left, right, mean = (
         (one.value_deg, COVERAGE * one.error_deg) for one in (pile.angles.left, pile.angles.right, pile.angles.mean)
     )
-    ends = pile.base.at(np.array([0.0, pile.size[0] - 1.0]))
     return ReadPile(
         name=pile.name,
         unit=pile.unit,
@@ -166,10 +172,11 @@ def _read(pile: PhotographedPile, board: Board | None) -> ReadPile:
         left_thirds=pile.angles.left.thirds_deg,
         right_thirds=pile.angles.right.thirds_deg,
         lens=pile.lens,
-        checkerboard="" if board is None else board.name,
+        checkerboard="" if measured.board is None else measured.board.name,
         size=pile.size,
         pixel=pile.pixel,
-        base=(float(ends[0]), float(ends[1])),
+        scale_from=measured.scale_from,
+        base=pile.base_ends,
         base_error=pile.base.offset_error,
         base_from=BASES[pile.base.kind],
         parts=dict(pile.angles.mean.parts_deg),

@@ -1,22 +1,27 @@
 """`explorer measure`: from options, checked before any picture is opened, to a reading per picture and its files.
 
-Pictures are read, their scale is found, a simulation is put beside them, and what was asked for is written.
+Pictures are read, their scale is found, a simulation is put beside them, and what was asked for is drawn.
 """
 
 from __future__ import annotations
 
+import hashlib
 import io
 import math
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from explorer.errors import CommandError
 from explorer.files.output_file import check_new_file, write_whole, write_whole_bytes
-from explorer.photograph.annotated import sheet
+from explorer.photograph.annotated import MOST_PANELS, sheet
 from explorer.photograph.result import MeasuredPhotographs
 from explorer.photograph.simulated import simulated_piles
+from explorer.units import number
 from solver.assets import asset_path
 from solver.photograph import (
     Board,
@@ -34,6 +39,8 @@ from solver.photograph.lens import centred, straight, straightened
 
 FARTHEST = 1e5
 """Largest coordinate that a picture may be asked about [px]."""
+MOST_DECODED = 24
+"""Pictures that are kept in memory between their check and their reading."""
 SAME_SHAPE = 0.01
 """By which the width over the height of two pictures of one camera may differ, relatively."""
 
@@ -116,34 +123,68 @@ def _numbers(text: str, option: str, form: str) -> tuple[float, ...]:
 def run_measure(order: MeasureOrder) -> MeasuredPhotographs:
     """Every picture is opened before the first is measured, so that a bad file ends the command at once.
 
-    Raises PhotographError for a file that is no picture, or no checkerboard, and whatever the simulated source raises.
+    Raises PhotographError for a file that is no picture, or no checkerboard, CommandError for a picture that stands
+    twice, even in two files (its pile would be counted twice), and whatever the simulated source raises.
     """
-    pictures = [open_picture(path) for path in order.pictures]
-    board = None if order.checkerboard is None else _board(order.checkerboard, pictures)
-    measured = MeasuredPhotographs(
-        tuple(_reading(picture, order, board) for picture in pictures),
+    board = None if order.checkerboard is None else board_of(open_picture(order.checkerboard))
+    names = _names(order.pictures)
+    seen: dict[bytes, Path] = {}
+    first: list[Picture] = []
+    for path, name in zip(order.pictures, names, strict=True):
+        picture = replace(open_picture(path), name=name)
+        if (twin := seen.setdefault(hashlib.sha256(picture.grey.tobytes()).digest(), path)) is not path:
+            raise CommandError(f"{path}: is the same picture as {twin}; name each pile once")
+        if board is not None:
+            _check_camera(picture, board)
+        # Hundreds of decoded pictures do not fit into memory; a few need not be decoded again.
+        first += [picture] if len(first) < MOST_DECODED else []
+    rest = order.pictures[len(first) :]
+    decoded = (replace(open_picture(path), name=name) for path, name in zip(rest, names[len(first) :], strict=True))
+    return MeasuredPhotographs(
+        tuple(_reading(picture, order, board) for pictures in (first, decoded) for picture in pictures),
         None if order.simulation is None else simulated_piles(order.simulation),
         board,
+        _scale_from(order),
     )
+
+
+def write_drawings(order: MeasureOrder, measured: MeasuredPhotographs) -> None:
+    """Write the files of ``order`` that show what was ``measured``: the pictures with it drawn in, and an outline."""
     if order.plot is not None:
         file = io.BytesIO()
-        sheet(pictures, measured.readings, measured.simulated).save(file, "PNG")
+        drawn_sheet(order, measured).save(file, "PNG")
         write_whole_bytes(order.plot, file.getvalue())
     if order.outline is not None and measured.piles:
         write_whole(order.outline, outline_text(measured.piles[0]))
-    return measured
 
 
-def _board(path: Path, pictures: list[Picture]) -> Board:
-    """The checkerboard in ``path``; PhotographError where ``pictures`` are of another shape than that one."""
-    board = board_of(open_picture(path))
-    for picture in pictures:
-        if abs(picture.width / picture.height / board.shape - 1.0) > SAME_SHAPE:
-            raise PhotographError(
-                f"checkerboard {board.name}: {board.shape:.2f} times as wide as high, {picture.name} "
-                f"{picture.width / picture.height:.2f} times; allowed: whole pictures of one camera, held alike"
-            )
-    return board
+def drawn_sheet(order: MeasureOrder, measured: MeasuredPhotographs, thirds: bool = False) -> Image.Image:
+    """The pictures of ``order`` with what was ``measured`` drawn in (:func:`explorer.photograph.annotated.sheet`)."""
+    pictures = zip(map(open_picture, order.pictures[:MOST_PANELS]), measured.readings, strict=False)
+    return sheet([(replace(one, name=read.name), read) for one, read in pictures], measured, thirds)
+
+
+def _names(pictures: Sequence[Path]) -> list[str]:
+    """File names of ``pictures``, with their folders where two have one name."""
+    count = Counter(path.name for path in pictures)
+    return [path.name if count[path.name] == 1 else str(path) for path in pictures]
+
+
+def _scale_from(order: MeasureOrder) -> str:
+    """What tells the length of a pixel, in words; empty: nothing."""
+    if order.reference_length is None:
+        return "" if order.metres_per_pixel is None else "as stated"
+    places = "stated places" if order.reference_ends else "the ends of a bar in the picture"
+    return f"by {number(1e3 * order.reference_length, 4)} mm between {places}"
+
+
+def _check_camera(picture: Picture, board: Board) -> None:
+    """Raise PhotographError where ``picture`` is of another shape than that of the checkerboard ``board``."""
+    if abs(picture.width / picture.height / board.shape - 1.0) > SAME_SHAPE:
+        raise PhotographError(
+            f"checkerboard {board.name}: {board.shape:.2f} times as wide as high, {picture.name} "
+            f"{picture.width / picture.height:.2f} times; allowed: whole pictures of one camera, held alike"
+        )
 
 
 def _reading(picture: Picture, order: MeasureOrder, board: Board | None) -> PhotographedPile | Refusal:

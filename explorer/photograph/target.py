@@ -80,7 +80,17 @@ class PhotographedTarget:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the photographs as they came."""
-        return tuple(shown_name(pile.name) for pile in self.result.piles)
+        return tuple(map(self.name_of, self.result.piles))
+
+    @property
+    def kept(self) -> bool:
+        """Whether the photographs are kept under their digests; a record of before tells it by their names alone."""
+        kept = self.result.kept
+        return all(_digest(pile.name) for pile in self.result.piles) if kept is None else kept
+
+    def name_of(self, pile: ReadPile) -> str:
+        """Name of the photograph of ``pile`` as it came."""
+        return shown_name(pile.name) if self.kept else pile.name
 
     @property
     def short(self) -> str:
@@ -130,7 +140,7 @@ class PhotographedTarget:
     @property
     def outlines(self) -> dict[str, tuple[tuple[float, ...], tuple[float, ...]]]:
         """Name → u, z [m] of every photographed outline whose scale is known."""
-        known = [(shown_name(pile.name), pile) for pile in self.result.piles if pile.unit == "m"]
+        known = [(self.name_of(pile), pile) for pile in self.result.piles if pile.unit == "m"]
         names = [name for name, _ in known]
         return {
             name if names.count(name) == 1 else f"{name} ({k})": (pile.u, pile.z)
@@ -144,7 +154,7 @@ class PhotographedTarget:
             file = self.folder / (pile.name + UPRIGHT)
             if pile.unit == "m" and file.is_file():
                 source = f"data:image/jpeg;base64,{base64.b64encode(file.read_bytes()).decode()}"
-                return Backdrop(shown_name(pile.name), source, *_window(pile))
+                return Backdrop(self.name_of(pile), source, *_window(pile))
         return None
 
     def copied(self, folder: Path) -> None:
@@ -213,9 +223,9 @@ def keep_target(
         raise CommandError(f"{refusal.name}: no angle: {refusal.reason}: {refusal.detail}")
     old = _whole(folder) if anew else None
     before = None if anew else load_target(folder)
-    if before is not None and not all(_digest(pile.name) for pile in before.result.piles):
+    if before is not None and not before.kept:
         raise CommandError(f"{folder}: is a report of photographs, to which none is added; name another folder")
-    result = photograph_result(measured, "", "")
+    result = replace(photograph_result(measured, "", ""), kept=True)
     kept = list(before.result.piles) if before else []
     pictures: dict[str, bytes] = {}
     for file, pile, read in zip(files, measured.piles, result.piles, strict=True):
@@ -236,18 +246,14 @@ def keep_target(
     return PhotographedTarget(folder, replace(result, piles=tuple(kept)))
 
 
-def write_into_study(file: Path, pictures: Sequence[Path], measured: MeasuredPhotographs) -> str:
-    """Put what was read off ``pictures`` into the angle of repose of the study ``file``; the line that says so.
+def write_into_study(file: Path, measured: MeasuredPhotographs) -> str:
+    """Put what was ``measured`` on photographs into the angle of repose of the study ``file``; the line that says so.
 
-    Raises CommandError, with the file as it was, where one of them shows no pile or stands twice, and as
+    Raises CommandError, with the file as it was, where one of them shows no pile, and as
     :func:`explorer.study.edit.remeasured`; the study's own errors for one that cannot be read.
     """
     for refusal in measured.refusals:
         raise CommandError(f"{refusal.name}: no angle: {refusal.reason}: {refusal.detail}")
-    seen: dict[bytes, Path] = {}
-    for picture in pictures:
-        if (twin := seen.setdefault(picture.read_bytes(), picture)) is not picture:
-            raise CommandError(f"{picture}: is the same picture as {twin}; take one of another pile")
     target = PhotographedTarget(file.parent, photograph_result(measured, "", ""))
     (angle,) = (one for one in target.of_study(load_study(str(file)).targets) if one.observable == OBSERVABLE)
     assert angle.sd is not None
@@ -295,8 +301,8 @@ def _remove_pictures(folder: Path, names: set[str]) -> None:
 
 
 def _kept_name(name: str, content: bytes) -> str:
-    path = Path(shown_name(name))
-    return f"{label(path.stem)}-{hashlib.sha256(content).hexdigest()[:12]}{path.suffix.lower()}"
+    path, digest = Path(name), f"-{hashlib.sha256(content).hexdigest()[:12]}"
+    return f"{label(path.stem.removesuffix(digest))}{digest}{path.suffix.lower()}"
 
 
 def _digest(name: str) -> str:

@@ -130,9 +130,13 @@ def photograph_methods(result: PhotographResult) -> Methods:
         "window of the fit and pixels, a bend of the flank beyond its roughness, and what is not known of lens and "
         "camera."
     )
-    scales = dict.fromkeys(f"{number(1e3 * one.pixel, 4)} mm" for one in result.piles if one.unit == "m" and one.pixel)
+    scales = dict.fromkeys(
+        f"{number(1e3 * one.pixel, 4)} mm ({one.scale_from or 'as stated'})"
+        for one in result.piles
+        if one.unit == "m" and one.pixel
+    )
     if scales:
-        text += f" A pixel is {enumeration(list(scales))}, as stated."
+        text += f" A pixel is {enumeration(list(scales))}."
     if n > 1:
         text += f" The interval of the mean over {n} pictures is by Student’s t."
     return methods_section(text, _without_solver(result.versions), "Read")

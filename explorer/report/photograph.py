@@ -6,9 +6,9 @@ import io
 
 from PIL import Image
 
-from explorer.photograph.annotated import MOST_PANELS, sheet
+from explorer.photograph.annotated import MOST_PANELS
 from explorer.photograph.result import MeasuredPhotographs, PhotographResult, ReadPile
-from explorer.photograph.run import MeasureOrder
+from explorer.photograph.run import MeasureOrder, drawn_sheet
 from explorer.report.content import (
     Banner,
     Block,
@@ -26,8 +26,7 @@ from explorer.report.content import (
 from explorer.report.figures.style import ASSUMPTION, CHOSEN, FACTOR, TARGET, axis, chart, label, line
 from explorer.report.methods import photograph_methods
 from explorer.terminal.photograph import lens_words, thirds_words
-from explorer.units import MISSING, fixed, number
-from solver.photograph import open_picture
+from explorer.units import MISSING, enumeration, fixed, number
 
 MOST_BYTES = 1_500_000
 """Size of a picture, so that the page stays below 5 MB with its chart library and the overhead of base64."""
@@ -38,8 +37,7 @@ READ = "read"
 
 def read_picture(order: MeasureOrder, measured: MeasuredPhotographs) -> bytes:
     """The pictures with the readings drawn in, as one PNG of at most ``MOST_BYTES``."""
-    pictures = [open_picture(path) for path in order.pictures]
-    return png_within(MOST_BYTES, sheet(pictures, measured.readings, measured.simulated, thirds=True))
+    return png_within(MOST_BYTES, drawn_sheet(order, measured, thirds=True))
 
 
 def png_within(most: int, picture: Image.Image) -> bytes:
@@ -242,9 +240,9 @@ def _inputs(result: PhotographResult) -> Table:
         "found by",
         "lens k",
     )
-    return Table(
-        header, rows, "Base line: from the top, at both edges of the picture. Scale: as stated, taken as exact."
-    )
+    scales = dict.fromkeys(pile.scale_from or "as stated" for pile in result.piles if pile.unit == "m")
+    scale = f" Scale: {enumeration(list(scales))}, taken as exact." if scales else ""
+    return Table(header, rows, f"Base line: from the top, at both edges of the picture.{scale}")
 
 
 def _parts(result: PhotographResult) -> Table:

@@ -17,6 +17,7 @@ from solver.photograph.reading_error import COVERAGE, Angle
 
 MOST_POINTS = 400
 """Of a profile in plain data."""
+LENS_LEFT = "a stated base line tells no distortion of the lens: it is in the ±, not taken out; a checkerboard tells it"
 Rows = Sequence[tuple[str, str]]
 """What was read → its value, with its unit."""
 NOTE = (
@@ -56,6 +57,7 @@ def measure_text(measured: MeasuredPhotographs) -> str:
         )
         if measured.board is None:
             parts += [f"{pile.name}: {lens_words(pile.lens)}" for pile in measured.piles if pile.lens]
+            parts += [LENS_LEFT] if any(pile.base.kind == "given" for pile in measured.piles) else []
     if measured.board is not None:
         parts.append(_board_words(measured.board))
     if len(measured.piles) > 1:
@@ -138,6 +140,7 @@ def _pile_rows(pile: PhotographedPile, board: Board | None) -> Rows:
         ("roughness", f"{fixed(factor * roughness, places)} {unit}"),
         ("base line", f"{BASES[pile.base.kind]}, tilted by {signed(pile.base.tilt_deg)}°"),
         *([("lens", lens_words(pile.lens))] if pile.lens and board is None else []),
+        *([("lens", LENS_LEFT)] if pile.base.kind == "given" and board is None else []),
     )
 
 

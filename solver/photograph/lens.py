@@ -33,6 +33,8 @@ STEEP = 0.12
 INNER = 0.10
 """Share of a foot at either end where the pile is too thin to show it."""
 BLOCK = 8.0
+FOLD = 1.5
+"""r over 1 + k r² times it where 3 k r² = -1."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,8 @@ def straight(x: Array, y: Array, k: float) -> tuple[Array, Array]:
     """Places without the bend of a lens, from places as seen; both from the middle, over half the diagonal."""
     share = np.ones_like(x)
     for _ in range(50):
-        share = 1.0 / (1.0 + k * (x * x + y * y) * share * share)
+        # A barrel of this order folds back at 3 k r² = -1, farther out than a lens can show: it is cut off there.
+        share = 1.0 / np.maximum(1.0 + k * (x * x + y * y) * share * share, 1.0 / FOLD)
     return x * share, y * share
 
 

@@ -29,6 +29,8 @@ LEAST_SIDE = 32
 LONGEST = 2400
 """Longest side [px] of the grey levels used: more would not improve an angle."""
 WHITE = 255.0
+SENSOR_BITS = (10, 12, 14, 16)
+"""Bits of a grey level that a file of sixteen may hold."""
 FILM_DIAGONAL = math.hypot(36.0, 24.0)
 """Diagonal of a frame of 35 mm film [mm]."""
 MOST_FOCAL = 5000
@@ -169,8 +171,10 @@ def _grey(image: Image.Image, path: Path) -> Grey:
         levels = np.array(image, dtype=np.float32)
         if not np.isfinite(levels).all():
             raise PhotographError(f"{path}: a grey level is not finite")
-        # Sixteen bits have a known white; other levels are stretched over their own range.
-        low, high = (0.0, 65535.0) if image.mode.startswith("I;16") else (float(levels.min()), float(levels.max()))
+        # Sixteen bits have a known white, that of the sensor that fills fewer of them; other levels are stretched.
+        low, high = float(levels.min()), float(levels.max())
+        if image.mode.startswith("I;16"):
+            low, high = 0.0, next(2.0**bits - 1.0 for bits in SENSOR_BITS if high < 2.0**bits)
         return (levels - low) * np.float32(WHITE / max(high - low, 1e-9))
     if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:
         clear = image.convert("RGBA")

@@ -81,6 +81,21 @@ class PhotographedPile:
         assert right is not None
         return left, right
 
+    @property
+    def base_ends(self) -> tuple[float, float]:
+        """y of the base line at the left and the right edge of the picture, as seen [px]."""
+        columns = self.size[0]
+        x = np.linspace(0.0, columns - 1.0, 101)
+        if self.lens:
+            # The edges of the straight copy are others than those of the picture.
+            edges = np.array([0.0, columns - 1.0])
+            u, v, half = lens.centred(edges, self.base.at(edges), self.size[::-1])
+            ends = lens.straight(u, v, self.lens)[0] * half + 0.5 * (columns - 1)
+            x = np.linspace(ends[0], ends[1], 101)
+        x, y = self.as_seen(x, self.base.at(x))
+        left, right = np.interp([0.0, columns - 1.0], x, y)
+        return float(left), float(right)
+
     def in_picture(self, u: Array, z: Array) -> tuple[Array, Array]:
         """x, y [px] of points of the outline."""
         along = np.array([1.0, self.base.slope]) / np.hypot(1.0, self.base.slope)

@@ -93,7 +93,8 @@ class Angles:
     right: Angle
     mean: Angle
     level_shift_deg: float
-    """Largest half difference between the angles at 35 % and at 65 %; infinite where one of them cannot be read."""
+    """Largest half difference between the angles at 35 % and at 65 %; infinite where one of them cannot be read, or
+    no change of a flank when base line, top and edge are moved."""
     bend_deg: tuple[float, float]
     """Standard deviation of the thirds of the left and the right flank beyond that by roughness."""
 
@@ -122,10 +123,14 @@ def angles_of(
     moved = np.stack([np.array(flank_angles_deg(image, 1.0)) - value for image in changed])
     pixel = np.array([_jitter_deg(flank, step, noise_share) for flank in flanks])
     turn = float(np.degrees(line.slope_error))
-    level_known, moved_known = np.nan_to_num(level), np.nan_to_num(moved)
-    window = (moved_known**2).mean(axis=0)
+    level_known = np.nan_to_num(level)
+    # A flank that is lost when it is moved tells nothing: the other moves speak for it.
+    held = np.isfinite(moved)
+    window = np.where(held, moved, 0.0) ** 2
+    window = window.sum(axis=0) / np.maximum(held.sum(axis=0), 1)
+    both_held = held.all(axis=1)
     each = np.sqrt(level_known**2 + window + turn**2 + pixel**2 + LEAST_DEG**2)
-    window_of_mean = (moved_known.mean(axis=1) ** 2).mean()
+    window_of_mean = (moved[both_held].mean(axis=1) ** 2).mean() if both_held.any() else window.mean()
     both = np.sqrt(level_known.mean() ** 2 + window_of_mean + (pixel**2).sum() / 4.0 + LEAST_DEG**2)
     sides, tops = _thirds(seen.images[1]), column_tops(seen.images[1]).astype(np.float64)
     thirds = np.array([[np.nan if third is None else third.angle_deg for third in side] for side in sides])
@@ -142,7 +147,8 @@ def angles_of(
             (value.mean(), thirds.mean(axis=0), both, flank.mean(), lens.mean(), camera.mean()),
         )
     ]
-    shift = float(np.abs(level).max()) if np.isfinite(level).all() else float("inf")
+    read = np.isfinite(level).all() and held.any(axis=0).all()
+    shift = float(np.abs(level).max()) if read else float("inf")
     return Angles(found[0], found[1], found[2], shift, (float(bend[0]), float(bend[1])))
 
 

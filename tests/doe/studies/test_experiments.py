@@ -98,6 +98,7 @@ def test_an_experiment_is_the_same_material_in_a_rig_of_its_own():
         ),
         ([DRUM], ["dram/dynamic_angle_deg"], r"target\.observable.*'dram/dynamic_angle_deg'"),
         ([DRUM], [], r"experiment\.name: no target reads drum"),
+        ([DRUM], ["drum/dynamic_angle_deg"] * 2, r"target\.observable: 'drum/dynamic_angle_deg' appears twice"),
         ([DRUM, DRUM], ["drum/dynamic_angle_deg"], r"experiment\.name: 'drum' appears twice"),
         ([DRUM | {"name": "a/b"}], ["drum/dynamic_angle_deg"], r"experiment\.name: 'a/b' is no name"),
         ([DRUM | {"rig": {"name": "dram"}}], ["drum/dynamic_angle_deg"], r"experiment drum: .*rig\.name.*'dram'"),

@@ -9,9 +9,11 @@ import pytest
 from PIL import Image
 
 from explorer.files.measured_curves import measured_file
+from explorer.photograph.run import measure_order, run_measure
 from explorer.photograph.target import load_target
 from solver.assets import measurement_folder, shipped_assets
 from solver.observables.silhouette import largest_part, silhouette
+from solver.photograph.lens import straight
 from solver.pours.record import Spheres
 from tests.explorer.command_line import explorer, refused
 from tests.solver.photograph.rendered import Look, fitted, photograph, save, solid_cover
@@ -143,6 +145,8 @@ def test_a_stated_reference_and_base_line(pile):
         (["PILE", "--plot", "plot.jpg"], [".png"]),
         (["PILE", "--plot", "no/folder/plot.png"], ["no folder"]),
         (["PILE", "--outline", "outline.csv"], ["--scale"]),
+        (["PILE", "--notes", "n"], ["--notes", "--report"]),
+        (["PILE", "PILE"], ["is the same picture as"]),
         (["PILE", "--from-simulation", "nothing.npz"], ["nothing.npz", "no such file"]),
         (["TEXT"], ["not a picture"]),
         ([], ["PHOTO"]),
@@ -156,6 +160,64 @@ def test_refusals_in_one_line_with_exit_code_2(arguments, words, pile, tmp_path,
     line = refused(explorer("measure", *named))
     assert all(word in line for word in words), line
     assert [path.name for path in tmp_path.iterdir()] == ["text.jpg"]
+
+
+def test_one_pile_in_two_formats_is_refused_and_two_of_one_name_are_told_apart(pile, tmp_path):
+    with Image.open(pile) as image:
+        image.save(tmp_path / "pile.tif")
+    assert "is the same picture as" in refused(explorer("measure", pile, tmp_path / "pile.tif"))
+    other = tmp_path / "pour 2" / "pile.png"
+    other.parent.mkdir()
+    save(other, photograph(solid_cover(29, 32, 90), SMALL))
+    report = tmp_path / "report"
+    found = data(explorer("measure", pile, other, "--json", "--report", report))
+    assert [one["picture"] for one in found["pictures"]] == [str(pile), str(other)]
+    assert str(other) in (report / "data" / "angles.csv").read_text(encoding="utf-8")
+
+
+def test_a_report_says_what_told_the_scale(pile, tmp_path):
+    words = {
+        ("--scale", "0.5"): "A pixel is 0.5 mm (as stated).",
+        ("--reference-length", "50", "--reference", "0,0,300,400"): (
+            "A pixel is 0.1 mm (by 50 mm between stated places)."
+        ),
+    }
+    for k, (options, text) in enumerate(words.items()):
+        assert explorer("measure", pile, *options, "--report", tmp_path / f"{k}").exit_code == 0
+        assert text in (tmp_path / f"{k}" / "report.md").read_text(encoding="utf-8")
+
+
+def test_the_base_line_in_a_report_is_on_the_picture_as_it_is_seen(tmp_path):
+    """A plate at y = c in the straight copy is seen at c (1 + k r²) from the middle at the edges of the picture."""
+    bent_pile = save(tmp_path / "pile.png", staged(Stage(30.0, fill=0.6, lens=0.1), replace(LOOK, base=0.9)))
+    board = save(tmp_path / "board.png", checkerboard(0.1))
+    order = measure_order([str(bent_pile)], None, None, None, "auto", None, None, None, str(board))
+    (pile,) = run_measure(order).piles
+    columns, rows = pile.size
+    middle, half = 0.5 * (np.array([columns, rows]) - 1), 0.5 * np.hypot(columns, rows)
+    for x, y in zip((0.0, columns - 1.0), pile.base_ends, strict=True):
+        u, v = straight((x - middle[0]) / half, (y - middle[1]) / half, pile.lens)
+        found = pile.base.at(u * half + middle[0])
+        assert v * half + middle[1] == pytest.approx(found, abs=0.05)
+    drawn = [pile.as_seen(np.array([x]), pile.base.at(np.array([x])))[1][0] for x in (0.0, columns - 1.0)]
+    assert np.abs(np.array(pile.base_ends) - drawn).max() > 0.2  # the copy's edges are elsewhere
+
+
+def test_a_stated_base_line_says_that_the_lens_stays(pile):
+    y = SMALL.base * round(0.62 * SMALL.width)
+    assert "tells no distortion of the lens" in explorer("measure", pile, "--baseline", f"{y},{y}").stdout
+
+
+def test_many_pictures_are_not_all_kept_in_memory(tmp_path, monkeypatch):
+    """Those beyond the first few are decoded again, with the same result."""
+    names = [
+        str(save(tmp_path / f"{k}.png", photograph(solid_cover(25 + k, 30, 90), replace(SMALL, seed=k))))
+        for k in range(3)
+    ]
+    order = measure_order(names, None, None, None, "auto", None, None, None)
+    whole = run_measure(order)
+    monkeypatch.setattr("explorer.photograph.run.MOST_DECODED", 1)
+    assert [one.angles for one in run_measure(order).piles] == [one.angles for one in whole.piles]
 
 
 def test_a_scan_that_is_no_pile_is_refused(pile, tmp_path):

@@ -137,7 +137,10 @@ def test_what_cannot_be_added_changes_nothing(piles, blank, tmp_path):
     assert not folder.exists()
     keep(folder, piles[0])
     before = files(folder)
-    for pictures, line in (((piles[0],), r"pile_1\.png: is in the target already"), ((piles[1], piles[1]), "already")):
+    for pictures, line in (
+        ((piles[0],), r"pile_1\.png: is in the target already"),
+        ((piles[1], piles[1]), "is the same"),
+    ):
         with pytest.raises(CommandError, match=line):
             keep(folder, *pictures)
     assert files(folder) == before
@@ -213,6 +216,20 @@ def test_a_kept_picture_is_called_as_it_came(name, shown):
     assert shown_name(name) == shown
 
 
+def test_a_name_that_ends_like_a_digest_stays_whole(piles, tmp_path):
+    """Cameras name pictures by their moment: twelve digits, which are a digest's as well."""
+    named = tmp_path / "IMG-202611241530.png"
+    named.write_bytes(piles[0].read_bytes())
+    assert keep(tmp_path / "target", named).names == (named.name,)
+    assert load_target(tmp_path / "target").names == (named.name,)
+    (twice,) = (one for one in (tmp_path / "target").iterdir() if one.suffix == ".png")
+    assert keep(tmp_path / "again", twice).names == (named.name,)  # a kept picture is given no second digest
+    assert explorer("measure", named, "--report", tmp_path / "report").exit_code == 0
+    assert load_target(tmp_path / "report").names == (named.name,)
+    line = refused(explorer("measure", piles[1], "--target", tmp_path / "report"))
+    assert "is a report of photographs" in line
+
+
 def test_a_record_from_elsewhere_takes_no_file_away(piles, tmp_path):
     victim = tmp_path / "victim-0123456789ab.png"
     victim.write_text("mine")
@@ -234,9 +251,12 @@ def test_measure_keeps_a_target_that_grows(piles, blank, tmp_path):
     assert "n = 3" in second.stderr
     assert len(json.loads(second.stdout)["pictures"]) == 2
     assert load_target(folder).n == 3
-    assert "already" in refused(explorer("measure", piles[1], "--target", folder))
+    plot = tmp_path / "plot.png"
+    assert "already" in refused(explorer("measure", piles[1], "--target", folder, "--plot", plot))
+    assert not plot.exists()
     lost = explorer("measure", blank, "--target", folder)
     assert (lost.exit_code, load_target(folder).n) == (1, 3)
+    assert lost.stderr.splitlines()[-1] == f"--target {folder}: nothing is written while a picture has no angle"
 
 
 def test_a_report_of_photographs_is_a_target_as_well(piles, tmp_path):
@@ -306,6 +326,10 @@ def test_a_study_that_does_not_fit_stays_as_it_was(piles, blank, tmp_path):
     assert file.read_text(encoding="utf-8") == before
     assert "no such study" in refused(explorer("measure", piles[0], "--target", tmp_path / "other.toml"))
     assert "is a material, not a study" in refused(explorer("measure", piles[0], "--target", tmp_path / "lentil.toml"))
+    (tmp_path / "S2.TOML").write_bytes(file.read_bytes())
+    assert explorer("measure", *piles, "--target", tmp_path / "S2.TOML").exit_code == 0
+    assert load_study(str(tmp_path / "S2.TOML")).targets[0].n == 3
+    (tmp_path / "S2.TOML").unlink()
     file.write_text(before.replace('"angle_of_repose_deg"', '"apex_height_m"'), encoding="utf-8")
     line = refused(explorer("measure", piles[0], "--target", file))
     assert line == "a photograph gives angle_of_repose_deg, but the study's target is apex_height_m"

@@ -20,8 +20,8 @@ from doe.provenance import About
 from explorer.audit.read_study import read_study, shipped_study
 from explorer.audit.report import graded
 from explorer.errors import CommandError
-from explorer.photograph.annotated import THIRD, sheet
-from explorer.photograph.run import measure_order, run_measure
+from explorer.photograph.annotated import THIRD
+from explorer.photograph.run import drawn_sheet, measure_order, run_measure
 from explorer.report.bench import bench_record, bench_report
 from explorer.report.content import Figure, Picture, Table, Word
 from explorer.report.folder import MANIFEST
@@ -31,7 +31,6 @@ from explorer.report.printed import drawn
 from explorer.report.project import KINDS, finished_folders, part_of, project_report
 from explorer.report.sources import SOURCES, cited
 from solver.assets import asset_path
-from solver.photograph import open_picture
 from tests.explorer.command_line import explorer, refused
 
 pytestmark = pytest.mark.usefixtures("unprinted")
@@ -333,9 +332,8 @@ def test_outlines_without_a_scale_are_not_drawn_beside_those_in_millimetres(plac
 def test_the_thirds_on_a_picture_have_the_slope_of_the_solid():
     order = measure_order(["cone_25_30"], None, 100.0, None, "auto", None, None, None)
     measured = run_measure(order)
-    pictures = [open_picture(path) for path in order.pictures]
-    pixels = np.asarray(sheet(pictures, measured.readings, None, thirds=True))
-    plain = np.asarray(sheet(pictures, measured.readings, None))
+    pixels = np.asarray(drawn_sheet(order, measured, thirds=True))
+    plain = np.asarray(drawn_sheet(order, measured))
     y, x = np.nonzero((pixels == THIRD).all(axis=2))
     assert not (plain == THIRD).all(axis=2).any()
     middle = 0.5 * (x.min() + x.max())

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.photograph import PhotographError, board_of, read_photograph
-from solver.photograph.lens import centred, straight
+from solver.photograph.lens import bent, centred, straight
 from tests.solver.photograph.rendered import Look, developed, picture_of
 from tests.solver.photograph.staged import Stage, staged
 
@@ -62,6 +62,18 @@ def test_a_pile_reads_as_through_a_straight_lens(k):
     assert np.ptp(ends[1]) > 0
     given = read_photograph(picture, base_line=tuple(np.polyval(inner, [0.0, 559.0])), bend=bend)
     assert given.angles.mean.value_deg == pytest.approx(known.angles.mean.value_deg, abs=0.3)
+
+
+def test_places_are_straightened_up_to_the_fold_of_a_barrel():
+    """r (1 + k r²) has its largest value where 3 k r² = -1: 0.7698 at k = -0.25. What is seen farther out is no image
+    of anything, and places there stay in order and at hand; within it the two functions are each other's inverse."""
+    for k in (-0.25, -0.15, 0.15, 0.5):
+        seen = np.linspace(0.0, 1.0, 201)
+        r, _ = straight(seen, np.zeros_like(seen), k)
+        assert (np.diff(r) > 0.0).all()
+        assert r.max() <= 1.5
+        within = seen < (0.76 if k == -0.25 else 0.97)
+        np.testing.assert_allclose(bent(r, np.zeros_like(r), k)[0][within], seen[within], atol=1e-6)
 
 
 def test_what_is_no_board_is_refused():

@@ -47,6 +47,12 @@ def test_sixteen_bits_have_the_same_white(tmp_path):
     np.testing.assert_allclose(open_picture(path).grey, ramp(), atol=1e-3)  # single precision
 
 
+def test_a_sensor_of_twelve_bits_has_its_own_white(tmp_path):
+    path = tmp_path / "a.tif"
+    Image.fromarray(np.round(ramp() * (4095 / 255)).astype(np.uint16)).save(path)
+    np.testing.assert_allclose(open_picture(path).grey, ramp(), atol=0.04)  # half a level of 4095
+
+
 def test_transparent_is_white(tmp_path):
     path = tmp_path / "a.png"
     Image.new("RGBA", (40, 40), (0, 0, 0, 0)).save(path)
