@@ -7,6 +7,7 @@ at their top, so that ``explorer --help`` answers at once.
 from __future__ import annotations
 
 import errno
+import os
 from typing import Any
 
 import typer
@@ -170,4 +171,7 @@ app.add_typer(store.app, name="store")
 
 def main() -> None:
     """Entry point of the command ``explorer``."""
+    # Matrices here are small, and beside busy workers OpenBLAS waits milliseconds for its own second thread: fitting 38
+    # spheres to a mesh takes five times as long. NumPy reads it when it is imported, and worker processes inherit it.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     app(prog_name="explorer")

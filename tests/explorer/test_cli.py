@@ -1,5 +1,6 @@
 """The command line: help, versions, refusals. Every refusal is one line and exit code 2, and leaves nothing behind."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -23,6 +24,18 @@ def test_help_answers_without_the_solver():
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
     assert all(name in done.stdout for name in COMMANDS)
+
+
+@pytest.mark.parametrize(("given", "used"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])
+def test_small_matrices_are_left_to_one_thread_unless_the_user_says_otherwise(given, used):
+    """It is set before NumPy is imported, which reads it then, and worker processes inherit it."""
+    program = (
+        "import os, sys\nfrom explorer import cli\n"
+        "cli.app = lambda **_: print('numpy' in sys.modules, os.environ['OPENBLAS_NUM_THREADS'])\ncli.main()\n"
+    )
+    environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"} | given
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.stdout.split() == ["False", used], done.stderr
 
 
 @pytest.mark.parametrize("command", COMMANDS)
