@@ -94,11 +94,11 @@ def simulation_of(order: SimulateOrder, events: bool = False) -> Simulation:
     if order.seed not in (None, first):
         raise CommandError(f"--seed {order.seed}: the interrupted pour has the seed {first}; leave out --seed")
     found = Simulation(scene, range(first, first + order.replicates), interrupted)
-    of_pours = order.watched or order.resume or order.replicates > 1 or events or order.scheduler
+    of_pours = order.watched or order.resume or order.replicates > 1 or events or order.scheduler or order.threads
     if found.is_bench_test and of_pours:
         raise CommandError(
-            f"{scene.rig.name} is a bench test: --record, --checkpoint, --resume, --replicates, --events and "
-            "--scheduler are for pours"
+            f"{scene.rig.name} is a bench test: --record, --checkpoint, --resume, --replicates, --threads, "
+            "--scheduler and --events are for pours"
         )
     return found
 

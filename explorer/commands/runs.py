@@ -23,6 +23,8 @@ def runs(
     path = store or default_store()
     # The default folder holds one store file for each version of the physics.
     others = sorted(set(path.parent.glob("*.sqlite")) - {path}) if store is None else []
+    if path.is_dir():
+        raise CommandError(f"--store {path}: is a folder; name the file of a store")
     if not path.is_file():
         beside = f"; other stores there: {', '.join(other.name for other in others)}" if others else ""
         raise CommandError(f"{path}: no store of runs there yet; `explorer calibrate --headless` makes one{beside}")

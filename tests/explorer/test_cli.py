@@ -85,6 +85,7 @@ AT = "tcp://127.0.0.1:9"
         (["funnel", "--scheduler", AT, "--record", "pour.rrd"], ["--record", "leave out --scheduler"]),
         (["funnel", "--scheduler", AT, "--checkpoint", "pour.npz"], ["--checkpoint", "leave out --scheduler"]),
         (["inclined_plane", "--scheduler", AT], ["inclined_plane is a bench test", "--scheduler"]),
+        (["inclined_plane", "--threads", "2"], ["inclined_plane is a bench test", "--threads"]),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else None,
 )

@@ -32,6 +32,11 @@ def test_runs_are_counted_and_the_physics_is_named(path):
     assert table[-1].split() == ["s", "pilot", "at_rest", "2"]
 
 
+def test_a_folder_is_no_store(tmp_path):
+    line = refused(explorer("runs", "--store", tmp_path))
+    assert line == f"--store {tmp_path}: is a folder; name the file of a store"
+
+
 def test_a_table_has_the_observables_of_today(path):
     """What was never read is read off the raw pours."""
     result = explorer("runs", "--csv", "--store", path)
